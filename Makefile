@@ -1,0 +1,53 @@
+# Everything a fresh machine needs is here: Python 3.11 to 3.13, make, and the package registries.
+PYTHON ?= python3
+VENV ?= .venv
+WORKERS ?= 2
+BIN := $(VENV)/bin
+
+# More BLAS threads than cores make two test workers slower, not faster.
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
+
+.PHONY: help demo test lint types format clean
+.NOTPARALLEL:
+
+help:
+	@echo "make demo    install braidcast in $(VENV) and simulate examples/success.toml into demo/"
+	@echo "make test    install and run the tests"
+	@echo "make lint    ruff: rules and layout"
+	@echo "make types   mypy"
+	@echo "make format  let ruff lay the sources out"
+	@echo "make clean   remove $(VENV), demo/ and caches"
+
+demo: $(VENV)/.installed-pictures
+	$(BIN)/braidcast simulate examples/success.toml -o demo
+
+test: $(VENV)/.installed-test
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -n $(WORKERS) --dist worksteal
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.installed-dev
+	$(BIN)/mypy
+
+format: $(VENV)/.installed-dev
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf $(VENV) demo .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || { \
+	    echo "braidcast needs Python 3.11 to 3.13; say which with: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; \
+	    exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+# A stamp for each set of extras: installed again only when pyproject.toml changes.
+$(VENV)/.installed-%: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet -e ".[$*]"
+	@touch $@
+
+.PRECIOUS: $(VENV)/.installed-%

@@ -1,0 +1,43 @@
+"""Braided stents in vessels with an aneurysm: their deployment by finite elements.
+
+>>> import braidcast
+>>> case = braidcast.Case.from_toml("examples/success.toml")
+>>> deployment = braidcast.simulate(case)
+>>> deployment.outcome
+'success'
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from braidcast.case import Case
+    from braidcast.deployment.output import write_deployment
+    from braidcast.deployment.result import Deployment
+    from braidcast.deployment.simulate import simulate
+    from braidcast.errors import InputError
+
+__version__ = "0.1.0"
+
+__all__ = ["Case", "Deployment", "InputError", "__version__", "simulate", "write_deployment"]
+
+_homes = {
+    "Case": "braidcast.case",
+    "Deployment": "braidcast.deployment.result",
+    "InputError": "braidcast.errors",
+    "simulate": "braidcast.deployment.simulate",
+    "write_deployment": "braidcast.deployment.output",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name when it is first asked for, so that ``--help`` need not wait."""
+    if name not in _homes:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_homes[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,1 @@
+"""From a case to a deployed braid: crimp, position, release."""
