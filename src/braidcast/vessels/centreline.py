@@ -49,9 +49,7 @@ class QuadraticBezier:
     @cached_property
     def packed(self) -> NDArray[np.float64]:
         """The curve as the compiled functions of ``vessels.bezier`` read it."""
-        packed = bezier.pack_curve(self.P0, self.P1, self.P2)
-        packed.flags.writeable = False
-        return packed
+        return bezier.pack_curve(self.P0, self.P1, self.P2)
 
     @property
     def length(self) -> float:
@@ -77,20 +75,31 @@ class QuadraticBezier:
 
     def at_arc_length(self, s: ArrayLike) -> NDArray[np.float64]:
         """Points (n, 3) mm at arc lengths s (n,) mm from P0, on a tangent outside [0, length]."""
-        return bezier.places(self.packed, _row(s))[0]
+        return bezier.places(self.packed, _as_row(s))[0]
 
     def tangent_at_arc_length(self, s: ArrayLike) -> NDArray[np.float64]:
         """Unit tangents (n, 3) at arc lengths s (n,) mm from P0."""
-        return bezier.places(self.packed, _row(s))[1]
+        return bezier.places(self.packed, _as_row(s))[1]
 
     def closest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Distance (n,) mm and arc length (n,) mm of the nearest place to each of points (n, 3).
 
         An arc length outside [0, length] is a place on the end tangent.
         """
-        rows = np.ascontiguousarray(np.atleast_2d(np.asarray(points, dtype=np.float64)))
-        return bezier.closest_places(self.packed, rows)
+        return bezier.closest_places(self.packed, as_rows(points))
 
 
-def _row(s: ArrayLike) -> NDArray[np.float64]:
-    return np.ascontiguousarray(np.atleast_1d(np.asarray(s, dtype=np.float64)))
+def as_rows(points: ArrayLike) -> NDArray[np.float64]:
+    """Points as the compiled functions take them, (n, 3); a single point (3,) is one row.
+
+    Contiguous and, though nobody writes to it, writable: a read-only array is another type to
+    the compiler, which would compile everything again.
+    """
+    rows = np.require(np.atleast_2d(np.asarray(points)), np.float64, ["C", "W"])
+    if rows.ndim != 2 or rows.shape[1] != 3:
+        raise ValueError(f"points have the shape {rows.shape}, must be (n, 3)")
+    return rows
+
+
+def _as_row(s: ArrayLike) -> NDArray[np.float64]:
+    return np.require(np.atleast_1d(np.asarray(s)), np.float64, ["C", "W"])

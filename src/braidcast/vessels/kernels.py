@@ -42,7 +42,6 @@ def pack_vessel(
         packed[_SPHERE : _SPHERE + 3] = centre
         packed[_SPHERE + 3] = sphere_radius
         packed[_SPHERE + 4] = fillet
-    packed.flags.writeable = False
     return packed
 
 

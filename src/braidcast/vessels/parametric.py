@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from braidcast.errors import InputError
 from braidcast.vessels import kernels
-from braidcast.vessels.centreline import QuadraticBezier
+from braidcast.vessels.centreline import QuadraticBezier, as_rows
 
 
 class SignedDistance:
@@ -36,11 +36,11 @@ class SignedDistance:
         Within 1 µm of the centreline or of the sphere's centre, where the distance has a cusp,
         the gradient fades to zero and the Hessian stays finite.
         """
-        return kernels.evaluate(self.packed, _rows(points))
+        return kernels.evaluate(self.packed, as_rows(points))
 
     def distance(self, points: ArrayLike) -> NDArray[np.float64]:
         """Signed distance (n,) mm at points (n, 3)."""
-        return kernels.distance(self.packed, _rows(points))
+        return kernels.distance(self.packed, as_rows(points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +143,3 @@ class SaccularVessel(SignedDistance):
 def _require_positive(name: str, value: float) -> None:
     if not (math.isfinite(value) and value > 0.0):
         raise InputError(f"{name} = {value} mm must be positive")
-
-
-def _rows(points: ArrayLike) -> NDArray[np.float64]:
-    rows = np.ascontiguousarray(np.atleast_2d(np.asarray(points, dtype=np.float64)))
-    if rows.ndim != 2 or rows.shape[1] != 3:
-        raise ValueError(f"points have the shape {rows.shape}, must be (n, 3)")
-    return rows
