@@ -1,0 +1,210 @@
+"""Static equilibrium: Newton's method, and the path of load and prescribed motion.
+
+Wires are nearly inextensible, and a plain Newton step that turns an element stretches it to second
+order, which the next step pays for. So the geometric stiffness of a step uses the axial force that
+the *last* step predicted to first order, N = EA/L (u + du), not the one its stretch shows: Newton's
+method on the two-field functional of (x, N) with N condensed (Magisano, Leonetti & Garcea 2017).
+The solution is the same; the steps are some ten times longer.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from braidcast.mechanics.beams import State, axial_forces
+from braidcast.mechanics.block_tridiagonal import NotPositiveDefinite
+from braidcast.mechanics.friction import FrictionMemory
+from braidcast.mechanics.linear_solvers import Solve
+from braidcast.mechanics.problem import Problem
+from braidcast.mechanics.rotations import Array
+from braidcast.mechanics.system import Evaluation, Springs, System, moved
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """When an equilibrium is reached and how far a step may go.
+
+    ``tolerance``: largest sum of unbalanced nodal forces (moments divided by the mean element
+    length), N, or what rounding leaves where that is more; ``largest_step`` mm and ``largest_turn`` rad a node and iteration.
+    """
+
+    tolerance: float = 1e-8
+    iterations: int = 30
+    largest_step: float = np.inf
+    largest_turn: float = 1.0
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """How a solution ended: ``reason`` says why, in words; ``residual`` in N."""
+
+    state: State
+    converged: bool
+    reason: str
+    load_factor: float
+    iterations: int
+    residual: float
+    evaluation: Evaluation
+    axial: Array
+    memories: tuple[FrictionMemory, ...]
+
+
+def residual_norm(system: System, gradient: Array) -> float:
+    """Sum of unbalanced forces over the nodes, N; moments count divided by the element length."""
+    return float(np.abs(system.force_weight * gradient).sum())
+
+
+def rounding_floor(system: System) -> float:
+    """Unbalanced force, N, that rounding of the coordinates alone leaves in stiff beams."""
+    net = system.problem.net
+    extent = np.ptp(net.nodes, axis=0).max() / net.lengths.mean()
+    return float(np.finfo(float).eps * net.section.EA * extent * len(net.elements))
+
+
+def factorise(system: System, evaluation: Evaluation, shift: float) -> tuple[Solve, float]:
+    """Factor of the tangent, its diagonal raised by as much as it takes to make it positive."""
+    data = evaluation.data
+    for _ in range(40):
+        if shift > 0.0:
+            data = evaluation.data.copy()
+            data[system.diagonal] += shift * system.diagonal_scale
+        try:
+            return system.linear_solver(data), shift
+        except NotPositiveDefinite:
+            shift = max(4.0 * shift, 1e-6)
+    raise NotPositiveDefinite
+
+
+def newton(
+    system: System,
+    state: State,
+    options: NewtonOptions,
+    *,
+    load_factor: float = 1.0,
+    increment: Array | None = None,
+    axial: Array | None = None,
+    springs: Springs | None = None,
+    memories: tuple[FrictionMemory, ...] | None = None,
+) -> Equilibrium:
+    """Equilibrium at fixed load; ``increment`` (N, 6) is the supports' motion, local axes."""
+    if memories is None:
+        memories = system.at_rest(state)
+    net = system.problem.net
+    tolerance = max(options.tolerance, rounding_floor(system))
+    reason = f"no equilibrium within {options.iterations} Newton iterations"
+    converged = False
+    iterations = 0
+    while True:
+        evaluation = system.evaluate(
+            state,
+            load_factor,
+            axial=axial,
+            increment=increment,
+            springs=springs,
+            memories=memories,
+        )
+        residual = residual_norm(system, evaluation.gradient)
+        if not np.isfinite(residual):
+            reason = "the forces are no longer finite"
+            break
+        if increment is None and residual <= tolerance:
+            converged, reason = True, f"unbalanced force below {tolerance:.3g} N"
+            break
+        if iterations == options.iterations:
+            break
+        try:
+            solve, _ = factorise(system, evaluation, 0.0)
+        except NotPositiveDefinite:
+            reason = "the tangent stayed indefinite"
+            break
+        step = system.step(-solve(evaluation.gradient), increment)
+        if increment is None:
+            step *= _shortening(step, options)
+        increment = None
+        axial = axial_forces(
+            state.positions, net.elements, net.lengths, net.section.EA, step[:, :3].copy()
+        )
+        state = moved(state, step)
+        iterations += 1
+    return Equilibrium(
+        state,
+        converged,
+        reason,
+        load_factor,
+        iterations,
+        residual,
+        evaluation,
+        axial if axial is not None else np.full(len(net.elements), np.nan),
+        memories,
+    )
+
+
+def _shortening(step: Array, options: NewtonOptions) -> float:
+    far = np.abs(step[:, :3]).max()
+    turn = np.abs(step[:, 3:]).max()
+    return min(
+        1.0, options.largest_step / max(far, 1e-300), options.largest_turn / max(turn, 1e-300)
+    )
+
+
+def remembered(equilibrium: Equilibrium) -> tuple[FrictionMemory, ...]:
+    """What the walls remember of a converged state."""
+    return tuple(contact.memory for contact in equilibrium.evaluation.contacts)
+
+
+def follow_path(
+    problem: Problem,
+    state: State | None = None,
+    *,
+    steps: int = 10,
+    smallest_step: float = 1e-4,
+    options: NewtonOptions | None = None,
+    linear_solver: str = "block_tridiagonal",
+    progress: Progress | None = None,
+    path: tuple[float, float] = (0.0, 1.0),
+) -> Equilibrium:
+    """Raise loads and prescribed motion from one load factor to another, in adaptive steps.
+
+    A step that does not converge is halved, one that does quickly makes the next one longer; the
+    path ends unconverged, with its reason and last state, when a step would be below
+    ``smallest_step``.
+    """
+    options = options or NewtonOptions()
+    system = System(problem, linear_solver)
+    state = problem.net.reference if state is None else state
+    begin, end = path
+    size = (end - begin) / steps
+    reached = begin
+    iterations = 0
+    result = None
+    memories = system.at_rest(state)
+    axial = None
+    while result is None or reached != end:
+        target = end if abs(end - reached) <= abs(size) * (1 + 1e-9) else reached + size
+        attempt = newton(
+            system,
+            state,
+            options,
+            load_factor=target,
+            increment=(target - reached) * system.motion,
+            axial=axial,
+            memories=memories,
+        )
+        iterations += attempt.iterations
+        if attempt.converged:
+            state, reached, axial = attempt.state, target, attempt.axial
+            memories = remembered(attempt)
+            result = replace(attempt, iterations=iterations, memories=memories)
+            if attempt.iterations <= 5:
+                size *= 1.5
+            if progress is not None:
+                progress((reached - begin) / (end - begin))
+            continue
+        size *= 0.5
+        if abs(size) < smallest_step * abs(end - begin):
+            reason = f"stopped at load factor {reached:.4g}: {attempt.reason}"
+            return replace(attempt, iterations=iterations, reason=reason)
+    return result
