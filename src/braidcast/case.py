@@ -87,9 +87,7 @@ class Device(_Table):
     """
 
     name: str = Field("paper", description=f"one of: {', '.join(sorted(catalogue))}")
-    wires: int | None = Field(
-        None, ge=4, le=400, description="an even whole number from 4 to 400"
-    )
+    wires: int | None = Field(None, ge=4, le=400, description="an even whole number from 4 to 400")
     radius: Number | None = Field(
         None, gt=0.0, le=50.0, description="a number of mm above 0, at most 50"
     )
@@ -115,7 +113,9 @@ class Device(_Table):
             known = ", ".join(sorted(catalogue))
             raise InputError(f"device.name = {self.name!r} must be one of: {known}")
         try:
-            return replace(catalogue[self.name], **self.model_dump(exclude={"name"}, exclude_none=True))
+            return replace(
+                catalogue[self.name], **self.model_dump(exclude={"name"}, exclude_none=True)
+            )
         except InputError as error:
             raise InputError(f"device.{error}") from None
 
