@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from braidcast import feasibility
@@ -35,7 +36,7 @@ _LARGEST_FILE = 1_000_000
 
 
 def _point(default: Any = ...) -> Any:
-    return Field(default, description="three numbers of mm, each from -1000 to 1000")
+    return Field(default=default, description="three numbers of mm, each from -1000 to 1000")
 
 
 class _Table(BaseModel):
@@ -62,11 +63,11 @@ class Aneurysm(_Table):
 
     diameter: Number = Field(gt=0.0, le=100.0, description="a number of mm above 0, at most 100")
     protrusion: Number | None = Field(
-        None, gt=0.0, lt=1.0, description="a number between 0 and 1, both excluded"
+        default=None, gt=0.0, lt=1.0, description="a number between 0 and 1, both excluded"
     )
     centre: Point | None = _point(None)
     neck_fillet: Number = Field(
-        0.2, gt=0.0, le=1.0, description="a number of mm above 0, at most 1"
+        default=0.2, gt=0.0, le=1.0, description="a number of mm above 0, at most 1"
     )
 
     @model_validator(mode="after")
@@ -86,25 +87,29 @@ class Device(_Table):
     Lengths in mm, ``young_modulus`` in MPa.
     """
 
-    name: str = Field("paper", description=f"one of: {', '.join(sorted(catalogue))}")
-    wires: int | None = Field(None, ge=4, le=400, description="an even whole number from 4 to 400")
+    name: str = Field(default="paper", description=f"one of: {', '.join(sorted(catalogue))}")
+    wires: int | None = Field(
+        default=None, ge=4, le=400, description="an even whole number from 4 to 400"
+    )
     radius: Number | None = Field(
-        None, gt=0.0, le=50.0, description="a number of mm above 0, at most 50"
+        default=None, gt=0.0, le=50.0, description="a number of mm above 0, at most 50"
     )
     length: Number | None = Field(
-        None, gt=0.0, le=500.0, description="a number of mm above 0, at most 500"
+        default=None, gt=0.0, le=500.0, description="a number of mm above 0, at most 500"
     )
-    segments: int | None = Field(None, ge=2, le=2000, description="a whole number from 2 to 2000")
+    segments: int | None = Field(
+        default=None, ge=2, le=2000, description="a whole number from 2 to 2000"
+    )
     wire_radius: Number | None = Field(
-        None, gt=0.0, le=1.0, description="a number of mm above 0, at most 1"
+        default=None, gt=0.0, le=1.0, description="a number of mm above 0, at most 1"
     )
     young_modulus: Number | None = Field(
-        None, gt=0.0, le=1e7, description="a number of MPa above 0, at most 1e7"
+        default=None, gt=0.0, le=1e7, description="a number of MPa above 0, at most 1e7"
     )
     poisson_ratio: Number | None = Field(
-        None, gt=-1.0, le=0.5, description="a number above -1, at most 0.5"
+        default=None, gt=-1.0, le=0.5, description="a number above -1, at most 0.5"
     )
-    literal_angle: bool | None = Field(None, description="true or false")
+    literal_angle: bool | None = Field(default=None, description="true or false")
 
     @cached_property
     def braid(self) -> Braid:
@@ -135,23 +140,23 @@ class Site(_Table):
 
     eta: Number = Field(ge=0.0, le=1.0, description="a number from 0 to 1")
     crimped_radius: Number | None = Field(
-        None, gt=0.0, le=50.0, description="a number of mm above 0, at most 50"
+        default=None, gt=0.0, le=50.0, description="a number of mm above 0, at most 50"
     )
 
 
 class Wall(_Table):
     """Contact of wires and wall: Coulomb's coefficient of friction, 0 allowed."""
 
-    friction: Number = Field(0.1, ge=0.0, le=2.0, description="a number from 0 to 2")
+    friction: Number = Field(default=0.1, ge=0.0, le=2.0, description="a number from 0 to 2")
 
 
 class Case(_Table):
     """Everything a deployment depends on. Build it with ``from_toml`` or ``from_dict``."""
 
-    title: str = Field("", max_length=200, description="a text of at most 200 characters")
+    title: str = Field(default="", max_length=200, description="a text of at most 200 characters")
     vessel: Vessel = Field(description="a table with P1 and diameter")
     aneurysm: Aneurysm | None = Field(
-        None, description="a table with diameter, and protrusion or centre"
+        default=None, description="a table with diameter, and protrusion or centre"
     )
     device: Device = Field(default_factory=Device, description="a table")
     site: Site = Field(description="a table with eta")
@@ -213,7 +218,7 @@ class Case(_Table):
     def vessel_geometry(self) -> SaccularVessel:
         """The lumen: tube and, if there is one, aneurysm."""
         tube = Tube(self.centreline, self.vessel_radius)
-        if self.aneurysm is None:
+        if self.aneurysm is None or self.aneurysm_centre is None:
             return SaccularVessel(tube)
         sphere = Sphere(self.aneurysm_centre, self.aneurysm.diameter / 2.0)
         return SaccularVessel(tube, sphere, self.aneurysm.neck_fillet)
@@ -224,7 +229,7 @@ class Case(_Table):
         return self.vessel.diameter / 2.0
 
     @cached_property
-    def aneurysm_centre(self) -> np.ndarray | None:
+    def aneurysm_centre(self) -> NDArray[np.float64] | None:
         """Centre C_a of the sac, (3,) mm; None without an aneurysm."""
         if self.aneurysm is None:
             return None

@@ -56,12 +56,14 @@ def check_folder(folder: str | Path) -> None:
                     "free for a file"
                 )
         # Only trying tells: permission bits say nothing of read-only disks or of root's rights.
-        tempfile.TemporaryDirectory(
-            prefix=".braidcast-", dir=folder if folder.exists() else folder.parent
-        ).cleanup()
+        if folder.exists():
+            tempfile.TemporaryDirectory(prefix=".braidcast-", dir=folder).cleanup()
+        else:
+            folder.mkdir()
+            folder.rmdir()
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"output folder = {folder} must be writable: {reason}") from None
 

@@ -1,0 +1,70 @@
+"""Shared by the tests: a case, and a deployment made up from geometry alone."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from braidcast.case import Case
+from braidcast.deployment.result import Deployment
+
+
+@pytest.fixture
+def tables() -> dict[str, Any]:
+    """The tables of a valid case, for a test to spoil."""
+    return {
+        "title": "A case",
+        "vessel": {"P1": [0.0, 15.0, 25.0], "diameter": 3.0},
+        "aneurysm": {"diameter": 7.0, "protrusion": 0.5},
+        "device": {"wires": 12, "segments": 24},
+        "site": {"eta": 0.5},
+    }
+
+
+@pytest.fixture
+def case(tables: dict[str, Any]) -> Case:
+    return Case.from_dict(tables)
+
+
+@pytest.fixture
+def deployment(case: Case) -> Deployment:
+    """The braid bent along the centreline, just inside the vessel: no mechanics."""
+    return bent_along_vessel(case)
+
+
+def bent_along_vessel(case: Case) -> Deployment:
+    braid, centreline = case.braid, case.centreline
+    radius = case.vessel_radius - 2.0 * braid.wire_radius
+    length = braid.crimped_length(radius)
+    straight = braid.positions_on_cylinder(radius, length)
+    along = case.start_arc_length + straight[:, 2]
+    across = np.array([1.0, 0.0, 0.0])
+    beside = np.cross(centreline.tangent_at_arc_length(along), across)
+    positions = (
+        centreline.at_arc_length(along) + straight[:, :1] * across + straight[:, 1:2] * beside
+    )
+    return Deployment(
+        case=case,
+        positions=positions,
+        rotations=np.tile(np.eye(3), (len(positions), 1, 1)),
+        elements=braid.elements,
+        crossings=braid.crossings,
+        wire_distance=-case.vessel_geometry.distance(positions) - braid.wire_radius,
+        contact_force=np.linspace(0.0, 1e-3, len(positions)),
+        outcome="success",
+        clinical_outcome="success",
+        converged=True,
+        reason="equilibrium",
+        newton_iterations=70,
+        residual_N=1e-6,
+        residual_relative=1e-5,
+        strain_energy_mJ=1.5,
+        max_penetration_mm=0.002,
+        crimped_length_mm=case.crimped_length,
+        deployed_length_mm=length,
+        free_length_mm=braid.length,
+        end_nodes_in_sac=0,
+        wall_seconds=6.0,
+        cpu_seconds=5.9,
+        frames=[("crimp", braid.positions), ("release <&>", positions)],
+    )
