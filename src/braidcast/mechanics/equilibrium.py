@@ -58,10 +58,13 @@ def residual_norm(system: System, gradient: Array) -> float:
 
 
 def rounding_floor(system: System) -> float:
-    """Unbalanced force, N, that rounding of the coordinates alone leaves in stiff beams."""
+    """Unbalanced force, N, that rounding of the coordinates alone leaves in stiff beams.
+
+    Each end of a beam is known to eps times its coordinates, and pulls on two nodes.
+    """
     net = system.problem.net
-    extent = np.ptp(net.nodes, axis=0).max() / net.lengths.mean()
-    return float(np.finfo(float).eps * net.section.EA * extent * len(net.elements))
+    reach = np.abs(net.nodes).max() / net.lengths.mean()
+    return float(4.0 * np.finfo(float).eps * net.section.EA * reach * len(net.elements))
 
 
 def factorise(system: System, evaluation: Evaluation, shift: float) -> tuple[Solve, float]:
