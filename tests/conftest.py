@@ -9,9 +9,20 @@ from braidcast.case import Case
 from braidcast.deployment.result import Deployment
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile before parallel workers start: two that first compile the same code can collide."""
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        vessel = bent_along_vessel(Case.from_dict(plain_tables())).case.vessel_geometry
+        vessel.evaluate(np.zeros((1, 3)))
+
+
 @pytest.fixture
 def tables() -> dict[str, Any]:
     """The tables of a valid case, for a test to spoil."""
+    return plain_tables()
+
+
+def plain_tables() -> dict[str, Any]:
     return {
         "title": "A case",
         "vessel": {"P1": [0.0, 15.0, 25.0], "diameter": 3.0},

@@ -255,3 +255,17 @@ def test_results_can_be_written_from_a_thread(deployment: Deployment, tmp_path: 
     thread.start()
     thread.join()
     assert names(tmp_path / "out") == FILES
+
+
+def test_a_disk_too_full_for_the_picture_costs_only_the_picture(
+    deployment: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(output, "picture_png", lambda *_: b"x" * 3_000_000)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2_500_000, limits[1]))
+    try:
+        written = write_deployment(deployment, tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert written.notes == ["no deployed.png: File too large"]
+    assert names(tmp_path) == FILES

@@ -92,11 +92,14 @@ def write_deployment(
         return Written(files, [])
     try:
         png = picture_png(deployment, surface)
+        with _workplace(folder) as work:
+            (work / "deployed.png").write_bytes(png)
+            _flush(work / "deployed.png")
+            _move(work, folder, [Path("deployed.png")])
     except PictureError as error:
         return Written(files, [f"no deployed.png: {error}"])
-    with _workplace(folder) as work:
-        (work / "deployed.png").write_bytes(png)
-        _move(work, folder, [Path("deployed.png")])
+    except OSError as error:  # the results are there: a picture is not worth failing for
+        return Written(files, [f"no deployed.png: {error.strerror or error}"])
     return Written([*files, folder / "deployed.png"], [])
 
 
