@@ -9,16 +9,20 @@ from braidcast.mechanics.beams import BeamNet, Section, State
 from braidcast.mechanics.contact import Contact, SignedDistance
 from braidcast.mechanics.equilibrium import Equilibrium, NewtonOptions, follow_path
 from braidcast.mechanics.problem import Joints, Problem, Supports
+from braidcast.mechanics.surfaces import Cylinder, Plane, Sphere
 
 __all__ = [
     "BeamNet",
     "Contact",
+    "Cylinder",
     "Equilibrium",
     "Joints",
     "NewtonOptions",
+    "Plane",
     "Problem",
     "Section",
     "SignedDistance",
+    "Sphere",
     "State",
     "Supports",
     "follow_path",

@@ -16,12 +16,11 @@ from typing import Self
 
 import numba as nb
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from braidcast.errors import InputError
+from braidcast.mechanics.arrays import IntArray, as_array, as_indices, require_nodes
 from braidcast.mechanics.rotations import Array, log_into, log_tangent_coefficients
-
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,9 @@ class BeamNet:
 
     Parameters: ``nodes`` (N, 3) mm; ``elements`` (M, 2) node indices; ``section`` one for all;
     ``second_director`` (3,) or (M, 3), the direction of the section's second axis (made normal to
-    the beam; any normal when omitted, which is enough for circular sections).
+    the beam; any normal when omitted, which is enough for circular sections); ``end_tangents``
+    (M, 2, 3), the directions of the axis at both ends of each beam where it only approximates a
+    curve: contact then sees the curve and not the polygon (the chords when omitted).
 
     Raises InputError for elements without length, indices out of range or values not finite.
     """
@@ -79,21 +80,27 @@ class BeamNet:
         elements: ArrayLike,
         section: Section,
         second_director: ArrayLike | None = None,
+        end_tangents: ArrayLike | None = None,
     ) -> None:
-        self.nodes: Array = np.ascontiguousarray(nodes, dtype=np.float64)
-        self.elements: IntArray = np.ascontiguousarray(elements, dtype=np.int64)
+        self.nodes: Array = as_array("nodes", nodes, (None, 3))
+        self.elements: IntArray = as_indices("elements", elements)
         self.section = section
-        if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or not np.isfinite(self.nodes).all():
-            raise InputError("nodes must be finite coordinates of shape (N, 3) in mm")
-        if self.elements.ndim != 2 or self.elements.shape[1] != 2 or not len(self.elements):
+        if not len(self.elements):
             raise InputError("elements must be node indices of shape (M, 2), at least one")
-        if self.elements.min() < 0 or self.elements.max() >= len(self.nodes):
-            raise InputError(f"elements must name nodes 0 to {len(self.nodes) - 1}")
+        require_nodes("elements", self.elements, len(self.nodes))
         chords = self.nodes[self.elements[:, 1]] - self.nodes[self.elements[:, 0]]
         self.lengths: Array = np.linalg.norm(chords, axis=1)
         if not (self.lengths > 0.0).all():
             raise InputError(f"element {int(np.argmin(self.lengths))} has no length")
-        self.triads = _reference_triads(chords / self.lengths[:, None], second_director)
+        e1 = chords / self.lengths[:, None]
+        self.triads = _reference_triads(e1, second_director)
+        self.end_tangents: Array = np.repeat(e1[:, None], 2, axis=1)
+        if end_tangents is not None:
+            given = as_array("end_tangents", end_tangents, (len(e1), 2, 3))
+            norm = np.linalg.norm(given, axis=2, keepdims=True)
+            if not ((given * self.end_tangents).sum(axis=2) > 0.0).all():
+                raise InputError("end_tangents must point along their beams, from first to second")
+            self.end_tangents = given / norm
 
     @property
     def reference(self) -> State:
@@ -107,7 +114,8 @@ def _reference_triads(e1: Array, second_director: ArrayLike | None) -> Array:
         least = np.argmin(np.abs(e1), axis=1)
         hint = np.eye(3)[least]
     else:
-        hint = np.broadcast_to(np.asarray(second_director, dtype=np.float64), e1.shape)
+        shape = (3,) if np.ndim(second_director) == 1 else e1.shape
+        hint = np.broadcast_to(as_array("second_director", second_director, shape), e1.shape)
     e3 = np.cross(e1, hint)
     norm = np.linalg.norm(e3, axis=1, keepdims=True)
     if not (norm > 1e-9).all():

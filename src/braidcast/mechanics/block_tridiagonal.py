@@ -16,11 +16,12 @@ from collections.abc import Callable
 import numba as nb
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 from scipy.linalg.blas import dgemv, dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 from scipy.sparse.csgraph import connected_components
 
-from braidcast.mechanics.beams import IntArray
+from braidcast.mechanics.arrays import IntArray
 from braidcast.mechanics.rotations import Array
 
 LARGEST_GROUP = 24
@@ -44,7 +45,7 @@ class BlockTridiagonal:
         kept = self.group_of < 0
         eliminating = not kept.all()
         self.level = np.where(kept, levels // 2 if eliminating else levels, -1)
-        count = int(self.level.max()) + 1
+        count = int(self.level.max(initial=-1)) + 1
         self.sizes = np.bincount(self.level[kept], minlength=count)
         self.starts = np.concatenate([[0], np.cumsum(self.sizes)])
         order = np.flatnonzero(kept)[np.argsort(self.level[kept], kind="stable")]
@@ -85,7 +86,7 @@ class BlockTridiagonal:
         target[below] = self.below_at[lc[below]] + c[below] * self.sizes[lr[below]] + r[below]
         return target
 
-    def _map_direct(self, rows: IntArray, columns: IntArray, kept: Array) -> None:
+    def _map_direct(self, rows: IntArray, columns: IntArray, kept: NDArray[np.bool_]) -> None:
         both = np.flatnonzero(kept[rows] & kept[columns])
         target = self._target(rows[both], columns[both])
         self.direct_from = both[target >= 0]
@@ -93,7 +94,7 @@ class BlockTridiagonal:
 
     def _map_groups(self, indptr: IntArray, indices: IntArray) -> None:
         """For each group: its unknowns, its neighbours, and where their entries come from."""
-        size = int(self.group_of.max()) + 1
+        size = int(self.group_of.max(initial=-1)) + 1
         members = np.flatnonzero(self.group_of >= 0)
         members = members[np.argsort(self.group_of[members], kind="stable")]
         self.members = members
@@ -149,7 +150,8 @@ class BlockTridiagonal:
         )
         if not ok:
             raise NotPositiveDefinite
-        diagonal, below = [], []
+        diagonal: list[Array] = []
+        below: list[Array] = []
         for i, size in enumerate(self.sizes):
             a, b = self.diagonal_at[i], self.below_at[i]
             block = flat[a:b].reshape((size, size), order="F")

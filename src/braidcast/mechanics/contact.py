@@ -2,7 +2,9 @@
 
 The axis of a beam is the cubic through its nodes with their turned tangents,
 
-    x(s) = H1 x1 + H2 L t1 + H3 x2 + H4 L t2,          t_i = R_i e1,
+    x(s) = H1 x1 + H2 L t1 + H3 x2 + H4 L t2,          t_i = R_i t_i0,
+
+with t_i0 the reference tangents of ``BeamNet.end_tangents``,
 
 sampled at Gauss points. A point at gap ``g`` (depth inside the lumen less the wire's radius)
 carries the line force of reference length, regularised below the threshold ``h`` (errata row 10):
@@ -54,6 +56,8 @@ class Contact:
                 raise InputError(f"contact.{name} is {value}; it must be a positive number")
         if not (np.isfinite(self.friction) and self.friction >= 0.0):
             raise InputError(f"contact.friction is {self.friction}; it must be 0 or more")
+        if self.points < 1:
+            raise InputError(f"contact.points is {self.points}; it must be 1 or more")
 
 
 @dataclass(frozen=True)
@@ -124,7 +128,12 @@ class BeamContact:
         """Gauss points (M * points, 3) on the axes."""
         net = self.net
         return _axis_points(
-            state.positions, state.rotations, net.elements, net.triads, net.lengths, self.shape
+            state.positions,
+            state.rotations,
+            net.elements,
+            net.end_tangents,
+            net.lengths,
+            self.shape,
         )
 
     def at_rest(self, state: State) -> FrictionMemory:
@@ -181,7 +190,7 @@ class BeamContact:
         _to_elements(
             state.rotations,
             net.elements,
-            net.triads,
+            net.end_tangents,
             net.lengths,
             self.shape,
             gap,
@@ -206,7 +215,7 @@ def _axis_points(
     positions: Array,
     rotations: Array,
     elements: IntArray,
-    triads: Array,
+    ends: Array,
     lengths: Array,
     shape: Array,
 ) -> Array:
@@ -219,8 +228,8 @@ def _axis_points(
             t1 = 0.0
             t2 = 0.0
             for j in range(3):
-                t1 += rotations[n1, i, j] * triads[n, j, 0]
-                t2 += rotations[n2, i, j] * triads[n, j, 0]
+                t1 += rotations[n1, i, j] * ends[n, 0, j]
+                t2 += rotations[n2, i, j] * ends[n, 1, j]
             for q in range(count):
                 out[n * count + q, i] = (
                     shape[q, 0] * positions[n1, i]
@@ -272,7 +281,7 @@ def _normal_traction(
 def _to_elements(
     rotations: Array,
     elements: IntArray,
-    triads: Array,
+    ends: Array,
     lengths: Array,
     shape: Array,
     gap: Array,
@@ -299,7 +308,7 @@ def _to_elements(
                 for i in range(3):
                     t[s, i] = 0.0
                     for j in range(3):
-                        t[s, i] += rotations[node, i, j] * triads[n, j, 0]
+                        t[s, i] += rotations[node, i, j] * ends[n, s, j]
                     b[i, 6 * s + i] = shape[q, 2 * s]
                 # dx = arm w x t = -arm [t] w
                 b[0, 6 * s + 4] = arm * t[s, 2]

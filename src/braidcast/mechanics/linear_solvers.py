@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from braidcast.errors import InputError
-from braidcast.mechanics.beams import IntArray
+from braidcast.mechanics.arrays import IntArray
 from braidcast.mechanics.block_tridiagonal import BlockTridiagonal, NotPositiveDefinite
 from braidcast.mechanics.rotations import Array
 

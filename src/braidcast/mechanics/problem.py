@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from braidcast.errors import InputError
-from braidcast.mechanics.beams import BeamNet, IntArray
+from braidcast.mechanics.arrays import Array, IntArray, as_array, as_indices, require_nodes
+from braidcast.mechanics.beams import BeamNet
 from braidcast.mechanics.contact import Contact
-from braidcast.mechanics.rotations import Array
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,7 @@ class Joints:
     stiffness: float = 1e3
 
     def __post_init__(self) -> None:
-        pairs = np.asarray(self.pairs)
-        if pairs.ndim != 2 or pairs.shape[1] != 2:
-            raise InputError("joints.pairs must be node indices of shape (P, 2)")
+        object.__setattr__(self, "pairs", as_indices("joints.pairs", self.pairs))
         if self.method not in ("shared", "penalty"):
             raise InputError(f'joints.method is "{self.method}"; use "shared" or "penalty"')
         if not (np.isfinite(self.stiffness) and self.stiffness > 0.0):
@@ -46,21 +44,16 @@ class Supports:
     def __init__(
         self, fixed: ArrayLike, motion: ArrayLike | None = None, axes: ArrayLike | None = None
     ) -> None:
-        self.fixed = np.asarray(fixed, dtype=bool)
-        if self.fixed.ndim != 2 or self.fixed.shape[1] != 6:
-            raise InputError("supports.fixed must have shape (N, 6)")
+        self.fixed = as_array("supports.fixed", fixed, (None, 6)) != 0.0
         count = len(self.fixed)
         self.motion: Array = np.zeros((count, 6))
         if motion is not None:
-            self.motion[:] = motion
+            self.motion = as_array("supports.motion", motion, (count, 6))
         self.axes: Array | None = None
         if axes is not None:
-            self.axes = np.ascontiguousarray(axes, dtype=np.float64)
-            identity = np.einsum("nij,nik->njk", self.axes, self.axes)
-            if self.axes.shape != (count, 3, 3) or not np.allclose(identity, np.eye(3)):
-                raise InputError("supports.axes must be (N, 3, 3) orthonormal axes as columns")
-        if not np.isfinite(self.motion).all():
-            raise InputError("supports.motion must be finite")
+            self.axes = as_array("supports.axes", axes, (count, 3, 3))
+            if not np.allclose(self.axes.transpose(0, 2, 1) @ self.axes, np.eye(3), atol=1e-9):
+                raise InputError("supports.axes must be orthonormal, the axes as columns")
         if (self.motion[~self.fixed] != 0.0).any():
             raise InputError("supports.motion may only move freedoms that are fixed")
         turned = (self.motion[:, 3:] != 0.0).any(axis=1)
@@ -70,8 +63,10 @@ class Supports:
     @classmethod
     def clamp(cls, count: int, nodes: ArrayLike) -> "Supports":
         """All six freedoms of some of ``count`` nodes held."""
+        held = np.atleast_1d(np.asarray(nodes))
+        require_nodes("nodes", held, count)
         fixed = np.zeros((count, 6), dtype=bool)
-        fixed[np.asarray(nodes)] = True
+        fixed[held] = True
         return cls(fixed)
 
 
@@ -91,10 +86,27 @@ class Problem:
     levels: IntArray | None = None
 
     def __post_init__(self) -> None:
-        shape = (len(self.net.nodes), 6)
-        if self.supports is not None and self.supports.fixed.shape != shape:
-            raise InputError(f"supports.fixed has shape {self.supports.fixed.shape}, not {shape}")
-        if self.loads is not None and (
-            np.shape(self.loads) != shape or not np.isfinite(self.loads).all()
-        ):
-            raise InputError(f"loads must be finite and of shape {shape}")
+        count = len(self.net.nodes)
+        if self.joints is not None:
+            require_nodes("joints.pairs", self.joints.pairs, count)
+        if self.supports is not None and len(self.supports.fixed) != count:
+            raise InputError(f"supports are for {len(self.supports.fixed)} nodes, not {count}")
+        if self.loads is not None:
+            object.__setattr__(self, "loads", as_array("loads", self.loads, (count, 6)))
+        if self.levels is not None:
+            self._check_levels(count)
+
+    def _check_levels(self, count: int) -> None:
+        levels = np.asarray(self.levels)
+        if levels.shape != (count,) or not np.issubdtype(levels.dtype, np.integer):
+            raise InputError(f"levels must be whole numbers of shape ({count},)")
+        edges = self.net.elements
+        if self.joints is not None:
+            edges = np.concatenate([edges, self.joints.pairs])
+        far = np.abs(np.diff(levels[edges], axis=1)).ravel() > 1
+        if far.any():
+            first, second = edges[np.argmax(far)]
+            raise InputError(
+                f"levels must differ by at most 1 along beams and joints; nodes {first} and "
+                f"{second} have {levels[first]} and {levels[second]}"
+            )

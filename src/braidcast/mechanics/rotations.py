@@ -6,9 +6,8 @@ Reference: Battini & Pacoste 2002, appendix; Geradin & Cardona 2001, chapter 4.
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from braidcast.mechanics.arrays import Array
 
 SMALL_ANGLE = 1e-2
 """Below this angle (rad) the coefficients are taken from their series, exact to rounding."""
