@@ -28,7 +28,8 @@ class NewtonOptions:
     """When an equilibrium is reached and how far a step may go.
 
     ``tolerance``: largest sum of unbalanced nodal forces (moments divided by the mean element
-    length), N, or what rounding leaves where that is more; ``largest_step`` mm and ``largest_turn`` rad a node and iteration.
+    length), N, or what rounding leaves where that is more; ``largest_step`` mm and
+    ``largest_turn`` rad a node and iteration.
     """
 
     tolerance: float = 1e-8
