@@ -8,6 +8,7 @@ The pattern (CSR, both triangles) is analysed once, the numbers change at every 
 failed Cholesky factorisation is the cheap and exact sign of an indefinite tangent.
 """
 
+import weakref
 from collections.abc import Callable
 from importlib.util import find_spec
 
@@ -19,6 +20,9 @@ from braidcast.errors import InputError
 from braidcast.mechanics.arrays import IntArray
 from braidcast.mechanics.block_tridiagonal import BlockTridiagonal, NotPositiveDefinite
 from braidcast.mechanics.rotations import Array
+
+ZERO_PIVOT = -4
+"""PARDISO's error number for a pivot that is not positive."""
 
 Solve = Callable[[Array], Array]
 Factorise = Callable[[Array], Solve]
@@ -76,6 +80,8 @@ def _pardiso(indptr: IntArray, indices: IntArray) -> Factorise:
     from pypardiso.pardiso_wrapper import PyPardisoError
 
     n = len(indptr) - 1
+    if n == 0:
+        return lambda data: np.copy
     rows = np.repeat(np.arange(n), np.diff(indptr))
     upper = indices >= rows
     columns = indices[upper].astype(np.int32)
@@ -83,28 +89,38 @@ def _pardiso(indptr: IntArray, indices: IntArray) -> Factorise:
         np.int32
     )
     pardiso = PyPardisoSolver(mtype=2)
-    analysed = False
+    # MKL keeps one factor: which matrix it is of
+    factored: sp.csr_matrix | None = None
+
+    def call(phase: int, matrix: sp.csr_matrix, b: Array) -> Array:
+        pardiso.set_phase(phase)
+        return pardiso._call_pardiso(matrix, b.reshape(-1, 1)).ravel()
+
+    def refactor(matrix: sp.csr_matrix) -> None:
+        nonlocal factored
+        factored = None
+        try:
+            call(22, matrix, np.zeros(n))
+        except PyPardisoError as error:
+            if error.value != ZERO_PIVOT:
+                raise
+            raise NotPositiveDefinite from error
+        factored = matrix
 
     def factorise(data: Array) -> Solve:
-        nonlocal analysed
         matrix = sp.csr_matrix((data[upper], columns, starts), shape=(n, n))
-        zero = np.zeros((n, 1))
-        try:
-            if not analysed:
-                pardiso.set_phase(11)
-                pardiso._call_pardiso(matrix, zero)
-                analysed = True
-            pardiso.set_phase(22)
-            pardiso._call_pardiso(matrix, zero)
-        except PyPardisoError as error:
-            raise NotPositiveDefinite from error
+        refactor(matrix)
 
         def solve(b: Array) -> Array:
-            pardiso.set_phase(33)
-            return pardiso._call_pardiso(matrix, b.reshape(-1, 1)).ravel()
+            if factored is not matrix:
+                refactor(matrix)
+            return call(33, matrix, np.array(b, dtype=np.float64))
 
         return solve
 
+    call(11, sp.csr_matrix((np.zeros(len(columns)), columns, starts), shape=(n, n)), np.zeros(n))
+    # all that is handed out holds on to ``call``
+    weakref.finalize(call, pardiso.free_memory, everything=True)
     return factorise
 
 
