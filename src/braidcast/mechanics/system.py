@@ -12,6 +12,7 @@ from braidcast.mechanics.friction import FrictionMemory
 from braidcast.mechanics.linear_solvers import Factorise, breadth_first_levels, solver
 from braidcast.mechanics.problem import Problem
 from braidcast.mechanics.rotations import Array, spin_in_place
+from braidcast.mechanics.shared_supports import share_supports
 
 
 @dataclass(frozen=True)
@@ -90,13 +91,9 @@ class System:
             self.motion[:] = problem.supports.motion
             if problem.supports.axes is not None:
                 self.axes[:] = problem.supports.axes
-        # a joined node inherits the supports of its master, whichever of them was given
-        np.logical_or.at(self.fixed[:, :3], master, self.fixed[:, :3].copy())
-        self.fixed[:, :3] = self.fixed[master, :3]
-        given = np.flatnonzero(self.motion[:, :3].any(axis=1))
-        self.motion[master[given], :3] = self.motion[given, :3]
-        self.motion[:, :3] = self.motion[master, :3]
-        self.axes = np.ascontiguousarray(self.axes[master])
+        self.fixed, self.motion, self.axes = share_supports(
+            master, self.fixed, self.motion, self.axes
+        )
         self.has_axes = bool((self.axes != np.eye(3)).any())
         free = ~self.fixed
         own = free.copy()
