@@ -39,7 +39,8 @@ class Contact:
     """A wall and the law by which it pushes and holds.
 
     ``stiffness`` k in N/mm^2 (line force per penetration), ``threshold`` h in mm, ``friction``
-    Coulomb's coefficient, ``points`` Gauss points an element.
+    Coulomb's coefficient, ``points`` Gauss points an element, ``stick_stiffness`` in N/mm^2 the
+    tangential line force per elastic slip below Coulomb's limit.
     """
 
     surface: SignedDistance
@@ -48,9 +49,10 @@ class Contact:
     threshold: float
     friction: float = 0.0
     points: int = 3
+    stick_stiffness: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("wire_radius", "stiffness", "threshold"):
+        for name in ("wire_radius", "stiffness", "threshold", "stick_stiffness"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise InputError(f"contact.{name} is {value}; it must be a positive number")
@@ -177,7 +179,7 @@ class BeamContact:
                 lengths,
                 self._normal,
                 law.friction,
-                law.stiffness,
+                law.stick_stiffness,
                 law.threshold,
                 memory.points,
                 memory.gap,

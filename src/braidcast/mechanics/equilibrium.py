@@ -20,6 +20,9 @@ from braidcast.mechanics.problem import Problem
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import Evaluation, Springs, System, moved
 
+SMALLEST_SHIFT = 1e-4
+"""First raise of an indefinite tangent's diagonal, in units of the bending stiffness."""
+
 Progress = Callable[[float], None]
 
 
@@ -69,16 +72,21 @@ def rounding_floor(system: System) -> float:
 
 
 def factorise(system: System, evaluation: Evaluation, shift: float) -> tuple[Solve, float]:
-    """Factor of the tangent, its diagonal raised by as much as it takes to make it positive."""
-    data = evaluation.data
-    for _ in range(40):
+    """Factor of the tangent, its diagonal raised by as much as it takes to make it positive.
+
+    ``shift`` is what the last tangent took, in units of the bending stiffness of an element; a
+    part of it is tried first. Returns the solution operator and the shift used.
+    """
+    shift = shift / 32.0 if shift > 32.0 * SMALLEST_SHIFT else 0.0
+    for _ in range(30):
+        data = evaluation.data
         if shift > 0.0:
-            data = evaluation.data.copy()
+            data = data.copy()
             data[system.diagonal] += shift * system.diagonal_scale
         try:
             return system.linear_solver(data), shift
         except NotPositiveDefinite:
-            shift = max(4.0 * shift, 1e-6)
+            shift = max(8.0 * shift, SMALLEST_SHIFT)
     raise NotPositiveDefinite
 
 
@@ -98,6 +106,7 @@ def newton(
         memories = system.at_rest(state)
     net = system.problem.net
     tolerance = max(options.tolerance, rounding_floor(system))
+    shift = 0.0
     reason = f"no equilibrium within {options.iterations} Newton iterations"
     converged = False
     iterations = 0
@@ -120,7 +129,7 @@ def newton(
         if iterations == options.iterations:
             break
         try:
-            solve, _ = factorise(system, evaluation, 0.0)
+            solve, shift = factorise(system, evaluation, shift)
         except NotPositiveDefinite:
             reason = "the tangent stayed indefinite"
             break

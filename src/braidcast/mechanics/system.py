@@ -1,13 +1,14 @@
 """Gradient and tangent of the total potential, assembled over the free unknowns."""
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
 from braidcast.mechanics.beams import IntArray, State, beam_energy
-from braidcast.mechanics.contact import BeamContact, ContactForces
+from braidcast.mechanics.contact import BeamContact, Contact, ContactForces
 from braidcast.mechanics.friction import FrictionMemory
 from braidcast.mechanics.linear_solvers import Factorise, breadth_first_levels, solver
 from braidcast.mechanics.problem import Problem
@@ -71,6 +72,13 @@ class System:
         self.linear_solver: Factorise = solver(
             linear_solver, self.indptr, self.indices, self._dof_levels()
         )
+
+    def with_contacts(self, contacts: tuple[Contact, ...]) -> "System":
+        """The same system against other walls; the analysed pattern is shared."""
+        other = copy(self)
+        other.problem = replace(self.problem, contacts=contacts)
+        other.contacts = [BeamContact(self.problem.net, contact) for contact in contacts]
+        return other
 
     def _number(self, count: int) -> None:
         """Unknown (N, 6) of every freedom, -1 where prescribed; joined nodes share."""
@@ -263,6 +271,16 @@ class System:
             out[:, :3] = np.einsum("nij,nj->ni", self.axes, out[:, :3])
             out[:, 3:] = np.einsum("nij,nj->ni", self.axes, out[:, 3:])
         return out
+
+    def contact_force_at_nodes(self, contact: ContactForces) -> Array:
+        """Normal force (N,) N of a contact, each point's shared by the nodes of its element."""
+        elements = self.problem.net.elements
+        share = contact.normal.reshape(len(elements), -1)
+        points = (np.polynomial.legendre.leggauss(share.shape[1])[0] + 1.0) / 2.0
+        count = len(self.problem.net.nodes)
+        return np.bincount(elements[:, 0], share @ (1.0 - points), count) + np.bincount(
+            elements[:, 1], share @ points, count
+        )
 
     def at_rest(self, state: State) -> tuple[FrictionMemory, ...]:
         """Memories of walls that hold no slip yet, one for each contact."""

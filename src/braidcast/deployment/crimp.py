@@ -1,0 +1,113 @@
+"""Crimping: the free braid is squeezed onto a thinner cylinder.
+
+Paper, section 2.1.3: the circumferential freedoms are blocked, every node gets the same radial
+displacement, and the braid lengthens as it likes. The result depends on the device and the
+crimped radius alone, so it is computed once and kept.
+"""
+
+import hashlib
+import os
+from dataclasses import astuple
+from pathlib import Path
+
+import numpy as np
+from platformdirs import user_cache_path
+
+from braidcast.devices import Braid
+from braidcast.errors import InputError
+from braidcast.mechanics import (
+    BeamNet,
+    Equilibrium,
+    Joints,
+    NewtonOptions,
+    Problem,
+    Section,
+    State,
+    Supports,
+    follow_path,
+)
+from braidcast.mechanics.equilibrium import Progress
+
+VERSION = 1
+"""Raised whenever the crimped state of the same device would come out differently."""
+
+
+def braid_net(braid: Braid) -> BeamNet:
+    """The braid as a net of beams, stress-free as made."""
+    section = Section.circular(braid.wire_radius, braid.young_modulus, braid.poisson_ratio)
+    return BeamNet(np.array(braid.positions), np.array(braid.elements), section)
+
+
+def crimp(
+    braid: Braid,
+    crimped_radius: float,
+    *,
+    joints: Joints | None = None,
+    progress: Progress | None = None,
+) -> Equilibrium:
+    """Equilibrium with all wire axes at ``crimped_radius`` (mm) from the axis of the braid.
+
+    The first ring stays in its plane; ``joints`` default to shared translations. Raises
+    InputError if the radius is not between 0 and that of the free braid.
+    """
+    if not 0.0 < crimped_radius <= braid.axis_radius:
+        raise InputError(
+            f"site.crimped_radius is {crimped_radius} mm; it must be above 0 and at most "
+            f"{braid.axis_radius} mm, the free radius of the wire axes"
+        )
+    net = braid_net(braid)
+    count = len(net.nodes)
+    radial = net.nodes * [1.0, 1.0, 0.0] / braid.axis_radius
+    axial = np.tile([0.0, 0.0, 1.0], (count, 1))
+    axes = np.stack([radial, np.cross(axial, radial), axial], axis=2)
+    fixed = np.zeros((count, 6), dtype=bool)
+    fixed[:, :2] = True
+    rings = np.array(braid.rings)
+    fixed[rings == 0, 2] = True
+    motion = np.zeros((count, 6))
+    motion[:, 0] = crimped_radius - braid.axis_radius
+    problem = Problem(
+        net,
+        joints=joints or Joints(np.array(braid.crossings)),
+        supports=Supports(fixed, motion, axes),
+        levels=rings,
+    )
+    return follow_path(problem, steps=4, options=NewtonOptions(tolerance=1e-7), progress=progress)
+
+
+def crimped_state(braid: Braid, crimped_radius: float, progress: Progress | None = None) -> State:
+    """The crimped state, from the cache when this device was crimped before.
+
+    The cache is ``BRAIDCAST_CACHE`` or the user's cache folder; a file there is named by all that
+    it depends on, written whole or not at all, and computed anew when unreadable.
+
+    Raises RuntimeError if crimping does not converge.
+    """
+    path = _cache_file(braid, crimped_radius)
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return State(stored["positions"], stored["rotations"])
+    except (OSError, ValueError, KeyError, EOFError):
+        pass
+    result = crimp(braid, crimped_radius, progress=progress)
+    if not result.converged:
+        raise RuntimeError(f"crimping to {crimped_radius} mm failed: {result.reason}")
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(temporary, "wb") as file:
+            np.savez(file, positions=result.state.positions, rotations=result.state.rotations)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except OSError:
+        # a cache that cannot be written costs time, not the result
+        temporary.unlink(missing_ok=True)
+    return result.state
+
+
+def _cache_file(braid: Braid, crimped_radius: float) -> Path:
+    folder = os.environ.get("BRAIDCAST_CACHE")
+    key = repr((VERSION, astuple(braid), float(crimped_radius)))
+    name = hashlib.sha256(key.encode()).hexdigest()[:24]
+    return (Path(folder) if folder else user_cache_path("braidcast")) / f"crimped_{name}.npz"

@@ -1,0 +1,51 @@
+"""Did it succeed: where the two ends of the deployed braid lie (errata row 16)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from braidcast.case import Case
+from braidcast.mechanics.rotations import Array
+from braidcast.vessels import Tube
+
+APPOSED = 0.1
+"""An end farther than this from the wall, mm, is not apposed (clinical label)."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Both labels, each "success" or "failure", and the end nodes found in the sac."""
+
+    label: str
+    clinical_label: str
+    end_nodes_in_sac: int
+
+
+def outcome(case: Case, positions: Array, wire_distance: Array) -> Outcome:
+    """Labels of a deployed shape (N, 3), its free space to the wall (N,) given, mm.
+
+    The paper's failure: a node of an end ring lies in the sac, R_a - |C_a - x| - r_w >= 0. The
+    clinical one: such a node is also off the wall of the parent vessel, or a whole end ring stands
+    off the wall on average.
+    """
+    braid = case.braid
+    ends = np.array(braid.end_nodes)
+    in_sac = np.zeros(len(ends), dtype=bool)
+    if case.aneurysm is not None:
+        depth = case.aneurysm.diameter / 2.0 - np.linalg.norm(
+            positions[ends] - case.aneurysm_centre, axis=1
+        )
+        in_sac = depth - braid.wire_radius >= 0.0
+    parent = Tube(case.centreline, case.vessel_radius)
+    off_parent = np.abs(parent.distance(positions[ends]) + braid.wire_radius) > APPOSED
+    rings = np.array(braid.rings)[ends]
+    standing_off = any(
+        wire_distance[ends[rings == ring]].mean() > APPOSED for ring in np.unique(rings)
+    )
+    failed = bool(in_sac.any())
+    failed_clinically = bool((in_sac & off_parent).any()) or standing_off
+    return Outcome(_word(failed), _word(failed_clinically), int(in_sac.sum()))
+
+
+def _word(failed: bool) -> str:
+    return "failure" if failed else "success"

@@ -1,0 +1,137 @@
+"""One deployment from a case: crimp, position, release."""
+
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from braidcast.case import Case
+from braidcast.deployment.crimp import braid_net, crimped_state
+from braidcast.deployment.outcome import outcome
+from braidcast.deployment.position import RingPath, position
+from braidcast.deployment.release import ReleaseOptions, bending_stiffness, release, wall
+from braidcast.deployment.result import Deployment
+from braidcast.devices import Braid
+from braidcast.mechanics import Equilibrium, Joints, NewtonOptions, Problem, State
+from braidcast.mechanics.rotations import Array
+from braidcast.mechanics.system import System
+
+StageProgress = Callable[[str, float], None]
+"""Called with the stage ("crimp", "position", "release") and the share of it that is done."""
+
+
+def simulate(
+    case: Case,
+    *,
+    options: ReleaseOptions | None = None,
+    progress: StageProgress | None = None,
+    keep_frames: bool = False,
+    linear_solver: str = "block_tridiagonal",
+) -> Deployment:
+    """Finite element deployment of a case (paper, section 2.1.3).
+
+    A simulation that finds no equilibrium returns its last state with ``converged`` False and the
+    reason. ``keep_frames`` keeps the crimped, positioned and all intermediate released shapes.
+    """
+    wall_clock, cpu_clock = time.perf_counter(), time.process_time()
+    report = progress or (lambda stage, fraction: None)
+    braid = case.braid
+    rings = np.array(braid.rings)
+    crimped = crimped_state(braid, case.crimped_radius, partial(report, "crimp"))
+    report("crimp", 1.0)
+    heights = np.bincount(rings, weights=crimped.positions[:, 2]) / np.bincount(rings)
+    arc_lengths = case.start_arc_length + heights - heights[0]
+    path = RingPath.along(case.centreline.at_arc_length(arc_lengths))
+    contact = wall(braid, case.vessel_geometry, case.wall.friction)
+    joints = Joints(np.array(braid.crossings))
+    problem = Problem(braid_net(braid), joints=joints, contacts=(contact,), levels=rings)
+    system = System(problem, linear_solver)
+    frames = [("free", np.array(braid.positions)), ("crimp", crimped.positions)]
+    last, iterations = _position(system, crimped, path, braid, partial(report, "position"))
+    if last.converged:
+        frames.append(("position", last.state.positions))
+        released = release(
+            system,
+            last.state,
+            braid,
+            options or ReleaseOptions(),
+            axial=last.axial,
+            keep_path=keep_frames,
+            progress=partial(report, "release"),
+        )
+        last = released.equilibrium
+        iterations += released.iterations
+        frames += [("release", positions) for positions in released.path]
+    report("release", 1.0)
+    return _deployment(
+        case,
+        system,
+        last,
+        iterations,
+        heights[-1] - heights[0],
+        [*frames, ("release", last.state.positions)] if keep_frames else [],
+        (time.perf_counter() - wall_clock, time.process_time() - cpu_clock),
+    )
+
+
+def _position(
+    system: System,
+    crimped: State,
+    path: RingPath,
+    braid: Braid,
+    progress: Callable[[float], None],
+) -> tuple[Equilibrium, int]:
+    unit = bending_stiffness(braid) / braid.segment_length**3
+    options = NewtonOptions(
+        tolerance=0.1 * bending_stiffness(braid) / braid.axis_radius**2,
+        largest_step=0.3,
+    )
+    free = system.with_contacts(())
+    return position(free, crimped, np.array(braid.rings), path, 0.1 * unit, options, progress)
+
+
+def _deployment(
+    case: Case,
+    system: System,
+    last: Equilibrium,
+    iterations: int,
+    crimped_length: float,
+    frames: list[tuple[str, Array]],
+    seconds: tuple[float, float],
+) -> Deployment:
+    braid, state = case.braid, last.state
+    evaluation = system.evaluate(state, memories=last.memories, tangent=False)
+    contacts = evaluation.contacts[0]
+    total = contacts.total
+    wire_distance = -case.vessel_geometry.distance(state.positions) - braid.wire_radius
+    labels = outcome(case, state.positions, wire_distance)
+    rings = np.array(braid.rings)
+    centres = np.array(
+        [np.bincount(rings, weights=state.positions[:, i]) / np.bincount(rings) for i in range(3)]
+    ).T
+    return Deployment(
+        case=case,
+        positions=state.positions,
+        rotations=state.rotations,
+        elements=np.array(braid.elements),
+        crossings=np.array(braid.crossings),
+        wire_distance=wire_distance,
+        contact_force=system.contact_force_at_nodes(contacts),
+        outcome=labels.label,
+        clinical_outcome=labels.clinical_label,
+        converged=last.converged,
+        reason=last.reason,
+        newton_iterations=iterations,
+        residual_N=last.residual,
+        residual_relative=last.residual / total if total > 0.0 else float("nan"),
+        strain_energy_mJ=evaluation.strain_energy,
+        max_penetration_mm=contacts.penetration,
+        crimped_length_mm=float(crimped_length),
+        deployed_length_mm=float(np.linalg.norm(np.diff(centres, axis=0), axis=1).sum()),
+        free_length_mm=braid.length,
+        end_nodes_in_sac=labels.end_nodes_in_sac,
+        wall_seconds=seconds[0],
+        cpu_seconds=seconds[1],
+        frames=frames,
+    )

@@ -1,0 +1,104 @@
+"""Overdamped motion: how a structure let go of comes to rest.
+
+Every node moves against a drag, ``c dx/dt = -dPi/dx``, integrated by implicit Euler steps: each is
+an equilibrium with springs ``c/dt`` to where the nodes were. The steps grow as the motion slows.
+With friction the end is a state that sticks; it does not depend on the drag once the duration is
+long enough.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from braidcast.mechanics.beams import State
+from braidcast.mechanics.equilibrium import (
+    Equilibrium,
+    NewtonOptions,
+    Progress,
+    newton,
+    remembered,
+)
+from braidcast.mechanics.rotations import Array
+from braidcast.mechanics.system import Springs, System
+
+
+@dataclass(frozen=True)
+class RelaxationOptions:
+    """``drag`` N s/mm a node; ``duration`` and ``first_step`` s.
+
+    ``largest_move`` mm is how far the fastest node should go in a step, ``growth`` how much longer
+    a step may be than the last. A step that ends with less than ``acceptable`` N unbalanced is
+    taken, one that does not is shortened.
+    """
+
+    drag: float
+    duration: float
+    first_step: float
+    largest_move: float
+    acceptable: float
+    newton: NewtonOptions
+    growth: float = 2.0
+    shortest_step: float = 1e-6
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """The last equilibrium of the motion, ``steps`` taken and all ``iterations`` spent."""
+
+    last: Equilibrium
+    completed: bool
+    reason: str
+    steps: int
+    iterations: int
+    path: tuple[Array, ...]
+    """Positions after every step, when they were asked for."""
+
+
+def relax(
+    system: System,
+    start: State,
+    options: RelaxationOptions,
+    *,
+    axial: Array | None = None,
+    keep_path: bool = False,
+    progress: Progress | None = None,
+) -> Relaxation:
+    """Let go of a net at ``start`` and follow it for the duration."""
+    memories = system.at_rest(start)
+    drag = np.full(len(start.positions), options.drag)
+    state, time, step = start, 0.0, options.first_step
+    steps = iterations = 0
+    path: list[Array] = []
+    while True:
+        step = min(step, options.duration - time)
+        attempt = newton(
+            system,
+            state,
+            options.newton,
+            axial=axial,
+            springs=Springs(drag / step, state.positions),
+            memories=memories,
+        )
+        iterations += attempt.iterations
+        move = float(np.linalg.norm(attempt.state.positions - state.positions, axis=1).max())
+        balanced = attempt.residual <= max(options.acceptable, options.newton.tolerance)
+        if not balanced or move > 2.0 * options.largest_move:
+            if step <= options.shortest_step * options.duration:
+                reason = f"the motion stopped after {time:.3g} of {options.duration:.3g} s"
+                last = replace(attempt, state=state)
+                return Relaxation(
+                    last, False, f"{reason}: {attempt.reason}", steps, iterations, tuple(path)
+                )
+            step *= max(0.3, 0.9 * options.largest_move / move) if balanced else 1.0 / 3.0
+            continue
+        time, steps = time + step, steps + 1
+        state, axial, memories = attempt.state, attempt.axial, remembered(attempt)
+        if keep_path:
+            path.append(state.positions)
+        if progress is not None:
+            scale = options.first_step
+            progress(float(np.log1p(time / scale) / np.log1p(options.duration / scale)))
+        if time >= options.duration * (1.0 - 1e-12):
+            last = replace(attempt, memories=memories)
+            return Relaxation(last, True, "came to rest", steps, iterations, tuple(path))
+        step *= min(options.growth, max(0.3, options.largest_move / max(move, 1e-12)))
