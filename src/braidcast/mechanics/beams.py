@@ -44,6 +44,13 @@ class Section:
     @classmethod
     def circular(cls, radius: float, young_modulus: float, poisson_ratio: float) -> Self:
         """Solid circle: ``radius`` in mm, ``young_modulus`` in MPa."""
+        for name, value in (("radius", radius), ("young_modulus", young_modulus)):
+            if not (np.isfinite(value) and value > 0.0):
+                raise InputError(f"section.{name} is {value}; it must be a positive number")
+        if not -1.0 < poisson_ratio <= 0.5:
+            raise InputError(
+                f"section.poisson_ratio is {poisson_ratio}; it must be above -1 and at most 0.5"
+            )
         area = np.pi * radius**2
         inertia = np.pi * radius**4 / 4.0
         shear_modulus = young_modulus / (2.0 * (1.0 + poisson_ratio))

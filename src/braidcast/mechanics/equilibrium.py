@@ -62,13 +62,15 @@ def residual_norm(system: System, gradient: Array) -> float:
 
 
 def rounding_floor(system: System) -> float:
-    """Unbalanced force, N, that rounding of the coordinates alone leaves in stiff beams.
+    """Unbalanced force, N, that rounding of the coordinates alone leaves in stiff parts.
 
-    Each end of a beam is known to eps times its coordinates, and pulls on two nodes.
+    Each end of a beam or joint is known to eps times its coordinates, and pulls on two nodes.
     """
     net = system.problem.net
-    reach = np.abs(net.nodes).max() / net.lengths.mean()
-    return float(4.0 * np.finfo(float).eps * net.section.EA * reach * len(net.elements))
+    stiffness = net.section.EA / net.lengths.mean() * len(net.elements)
+    if len(system.penalty_pairs) and system.problem.joints is not None:
+        stiffness += system.problem.joints.stiffness * len(system.penalty_pairs)
+    return float(4.0 * np.finfo(float).eps * np.abs(net.nodes).max() * stiffness)
 
 
 def factorise(system: System, evaluation: Evaluation, shift: float) -> tuple[Solve, float]:
