@@ -24,6 +24,9 @@ The mechanics against closed forms, published values and itself. Made by
 - *Ring*: straight beams whose axis is given the directions of the circle at its nodes
   (`end_tangents`); with the bare polygon the mean gap is 2 % off, for its sagitta is ten times
   the penetration.
+- *Joints*: a spring opens by its force over its stiffness, here the paper's 1e3 N/mm, so that a
+  joint that carries more than 0.01 N opens by more than 1e-5 mm: the same braid moved by 2 mm
+  instead of 0.5 mm comes out 5e-5 mm apart, and that is the penalty's error, not the net's.
 - *Contact law*, ring: errata row 10, the regularised penalty.
 
 {table}

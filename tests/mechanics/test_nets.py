@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from problems.nets import SOLVERS, WIRE, distance, lattice, solved
-from problems.statics import chain, held, tip_load
 
 from braidcast.errors import InputError
 from braidcast.mechanics import (
@@ -20,6 +18,8 @@ from braidcast.mechanics import (
     follow_path,
 )
 from braidcast.mechanics.system import System
+from problems.nets import SOLVERS, WIRE, distance, lattice, solved
+from problems.statics import chain, held, tip_load
 
 SECTION = Section(EA=1e4, GJ=1.0, EIy=1.0, EIz=1.0)
 NODES = np.column_stack([np.arange(5.0), np.zeros(5), np.zeros(5)])

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from problems.statics import chain, held
 
 from braidcast.errors import InputError
 from braidcast.mechanics import BeamNet, Joints, Problem, Section, Supports, follow_path
 from braidcast.mechanics.rotations import exp_so3, log_so3
+from problems.statics import chain, held
 
 SECTION = Section(EA=1e4, GJ=0.8, EIy=1.0, EIz=2.0)
 TURN = exp_so3(np.array([[0.4, -1.1, 0.7]]))[0]

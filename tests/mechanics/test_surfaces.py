@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from problems.elements import difference
 
 from braidcast.errors import InputError
 from braidcast.mechanics import Cylinder, Plane, Sphere
+from problems.elements import difference
 
 SURFACES = [
     Plane([1.0, 2.0, 3.0], [0.0, 3.0, 4.0]),

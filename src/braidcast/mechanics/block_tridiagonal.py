@@ -107,7 +107,8 @@ class BlockTridiagonal:
             own = members[self.member_at[g] : self.member_at[g + 1]]
             slots = [np.arange(indptr[m], indptr[m + 1]) for m in own]
             columns = [indices[s] for s in slots]
-            around = np.unique(np.concatenate(columns))
+            around = np.sort(np.concatenate(columns))
+            around = around[np.diff(around, prepend=-1) != 0]
             around = around[self.group_of[around] < 0]
             entry = np.full((len(own), len(own) + len(around)), -1)
             wanted = np.concatenate([own, around])

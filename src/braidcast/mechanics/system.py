@@ -125,7 +125,8 @@ class System:
         for dofs in (self.element_dofs, self.pair_dofs):
             key = dofs[:, :, None] * n + dofs[:, None, :]
             keys.append(key[(dofs[:, :, None] >= 0) & (dofs[:, None, :] >= 0)])
-        unique = np.unique(np.concatenate(keys))
+        unique = np.sort(np.concatenate(keys))
+        unique = unique[np.diff(unique, prepend=-1) != 0]
         self.indices = (unique % n).astype(np.int64)
         self.indptr = np.searchsorted(unique, np.arange(n + 1) * n).astype(np.int64)
         self.diagonal = np.searchsorted(unique, keys[0])
@@ -278,9 +279,10 @@ class System:
         share = contact.normal.reshape(len(elements), -1)
         points = (np.polynomial.legendre.leggauss(share.shape[1])[0] + 1.0) / 2.0
         count = len(self.problem.net.nodes)
-        return np.bincount(elements[:, 0], share @ (1.0 - points), count) + np.bincount(
-            elements[:, 1], share @ points, count
-        )
+        nodal = np.zeros(count)
+        nodal += np.bincount(elements[:, 0], share @ (1.0 - points), count)
+        nodal += np.bincount(elements[:, 1], share @ points, count)
+        return nodal
 
     def at_rest(self, state: State) -> tuple[FrictionMemory, ...]:
         """Memories of walls that hold no slip yet, one for each contact."""
