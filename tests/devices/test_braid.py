@@ -120,3 +120,17 @@ def test_braids_compare_by_value_and_keep_their_arrays():
     assert PAPER.positions is PAPER.positions
     with pytest.raises(ValueError, match="read-only"):
         PAPER.positions[0, 0] = 1.0
+
+
+def test_tangents_are_those_of_the_helices() -> None:
+    """The chord between neighbours is the mean of their tangents, up to its length."""
+    braid = Braid()
+    chords = np.diff(braid.positions.reshape(48, 71, 3), axis=1)
+    tangents = braid.tangents.reshape(48, 71, 3)
+    mean = tangents[:, :-1] + tangents[:, 1:]
+    cosine = np.einsum("nij,nij->ni", chords, mean) / (
+        np.linalg.norm(chords, axis=2) * np.linalg.norm(mean, axis=2)
+    )
+    np.testing.assert_allclose(cosine, 1.0, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(braid.tangents, axis=1), 1.0)
+    np.testing.assert_allclose(braid.tangents[:, 2], np.sin(braid.pitch_angle))

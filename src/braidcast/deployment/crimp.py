@@ -35,7 +35,10 @@ VERSION = 1
 def braid_net(braid: Braid) -> BeamNet:
     """The braid as a net of beams, stress-free as made."""
     section = Section.circular(braid.wire_radius, braid.young_modulus, braid.poisson_ratio)
-    return BeamNet(np.array(braid.positions), np.array(braid.elements), section)
+    elements = np.array(braid.elements)
+    return BeamNet(
+        np.array(braid.positions), elements, section, end_tangents=braid.tangents[elements]
+    )
 
 
 def crimp(

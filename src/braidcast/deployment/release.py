@@ -18,7 +18,7 @@ from braidcast.mechanics.system import Springs, System
 WALL_STIFFNESS = 12.0
 """Line force per penetration of the stiff wall, in EI/l^4 with l the length of an element."""
 
-YIELDING = (0.01, 0.035, 0.12, 0.35)
+YIELDING = (0.01, 0.06, 0.3)
 """Share of that stiffness while the braid moves, and on the way to the stiff wall."""
 
 
@@ -33,7 +33,7 @@ class ReleaseOptions:
 
     duration: float = 12.0
     move: float = 0.25
-    tolerance: float = 1.0
+    tolerance: float = 10.0
     balance: float = 1e-5
 
 
@@ -97,7 +97,7 @@ def release(
             duration=options.duration * natural_time,
             first_step=0.006 * natural_time,
             largest_move=options.move,
-            acceptable=20.0 * force,
+            acceptable=2.0 * newton_options.tolerance,
             newton=newton_options,
         ),
         axial=axial,

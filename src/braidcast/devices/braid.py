@@ -144,6 +144,15 @@ class Braid:
         return _fixed(np.stack([x, y, z], axis=-1).reshape(-1, 3))
 
     @cached_property
+    def tangents(self) -> NDArray[np.float64]:
+        """Unit tangents of the free helices at the nodes, (N, 3)."""
+        across = self.positions[:, 1::-1] * self.angle_step
+        sense = np.where(self.wire_of_node < self.wires // 2, 1.0, -1.0)
+        rise = np.full(self.node_count, self.length / self.segments)
+        along = np.stack([-sense * across[:, 0], sense * across[:, 1], rise], axis=-1)
+        return _fixed(along / np.linalg.norm(along, axis=1, keepdims=True))
+
+    @cached_property
     def elements(self) -> NDArray[np.int64]:
         """Node pairs of the beams, (M, 2), wire after wire, along increasing z."""
         nodes = np.arange(self.node_count).reshape(self.wires, -1)

@@ -81,7 +81,7 @@ def relax(
         )
         iterations += attempt.iterations
         move = float(np.linalg.norm(attempt.state.positions - state.positions, axis=1).max())
-        balanced = attempt.residual <= max(options.acceptable, options.newton.tolerance)
+        balanced = attempt.converged or attempt.residual <= options.acceptable
         if not balanced or move > 2.0 * options.largest_move:
             if step <= options.shortest_step * options.duration:
                 reason = f"the motion stopped after {time:.3g} of {options.duration:.3g} s"
