@@ -13,32 +13,22 @@ from pathlib import Path
 import numpy as np
 from platformdirs import user_cache_path
 
+from braidcast.deployment.net import braid_net
 from braidcast.devices import Braid
 from braidcast.errors import InputError
 from braidcast.mechanics import (
-    BeamNet,
     Equilibrium,
     Joints,
     NewtonOptions,
     Problem,
-    Section,
     State,
     Supports,
     follow_path,
 )
 from braidcast.mechanics.equilibrium import Progress
 
-VERSION = 1
+VERSION = 2
 """Raised whenever the crimped state of the same device would come out differently."""
-
-
-def braid_net(braid: Braid) -> BeamNet:
-    """The braid as a net of beams, stress-free as made."""
-    section = Section.circular(braid.wire_radius, braid.young_modulus, braid.poisson_ratio)
-    elements = np.array(braid.elements)
-    return BeamNet(
-        np.array(braid.positions), elements, section, end_tangents=braid.tangents[elements]
-    )
 
 
 def crimp(

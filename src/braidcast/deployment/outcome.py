@@ -6,7 +6,6 @@ import numpy as np
 
 from braidcast.case import Case
 from braidcast.mechanics.rotations import Array
-from braidcast.vessels import Tube
 
 APPOSED = 0.1
 """An end farther than this from the wall, mm, is not apposed (clinical label)."""
@@ -31,12 +30,11 @@ def outcome(case: Case, positions: Array, wire_distance: Array) -> Outcome:
     braid = case.braid
     ends = np.array(braid.end_nodes)
     in_sac = np.zeros(len(ends), dtype=bool)
-    if case.aneurysm is not None:
-        depth = case.aneurysm.diameter / 2.0 - np.linalg.norm(
-            positions[ends] - case.aneurysm_centre, axis=1
-        )
+    sac = case.vessel_geometry.aneurysm
+    if sac is not None:
+        depth = sac.radius - np.linalg.norm(positions[ends] - sac.centre, axis=1)
         in_sac = depth - braid.wire_radius >= 0.0
-    parent = Tube(case.centreline, case.vessel_radius)
+    parent = case.vessel_geometry.tube
     off_parent = np.abs(parent.distance(positions[ends]) + braid.wire_radius) > APPOSED
     rings = np.array(braid.rings)[ends]
     standing_off = any(

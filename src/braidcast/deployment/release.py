@@ -8,6 +8,9 @@ they fit any device.
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from braidcast.deployment.net import wire_section
 from braidcast.devices import Braid
 from braidcast.mechanics import Contact, NewtonOptions, SignedDistance, State
 from braidcast.mechanics.equilibrium import Equilibrium, Progress, newton, remembered
@@ -48,7 +51,7 @@ class Release:
 
 def wall(braid: Braid, surface: SignedDistance, friction: float, share: float = 1.0) -> Contact:
     """Contact of the braid's wires with a wall of a share of the full stiffness."""
-    unit = bending_stiffness(braid) / braid.segment_length**4
+    unit = wire_section(braid).EIy / braid.segment_length**4
     return Contact(
         surface,
         wire_radius=braid.wire_radius,
@@ -57,11 +60,6 @@ def wall(braid: Braid, surface: SignedDistance, friction: float, share: float = 
         friction=friction,
         stick_stiffness=4.0 * unit,
     )
-
-
-def bending_stiffness(braid: Braid) -> float:
-    """EI of a wire, N mm^2."""
-    return braid.young_modulus * 3.141592653589793 * braid.wire_radius**4 / 4.0
 
 
 def release(
@@ -79,7 +77,7 @@ def release(
     Returns the last state, converged or not, with the reason.
     """
     stiff = system.problem.contacts[0]
-    force = bending_stiffness(braid) / braid.axis_radius**2
+    force = wire_section(braid).EIy / braid.axis_radius**2
     drag = 1.0
     natural_time = drag * braid.axis_radius**2 / (force * braid.segment_length)
     newton_options = NewtonOptions(
@@ -110,7 +108,7 @@ def release(
             replace(last, converged=False, reason=motion.reason), iterations, motion.path
         )
     drags = Springs(
-        stiffness=0 * positioned.positions[:, 0] + drag / (0.6 * natural_time),
+        stiffness=np.full(len(positioned.positions), drag / (0.6 * natural_time)),
         targets=last.state.positions,
     )
     for share in (*YIELDING[1:], 1.0):

@@ -7,10 +7,11 @@ from functools import partial
 import numpy as np
 
 from braidcast.case import Case
-from braidcast.deployment.crimp import braid_net, crimped_state
+from braidcast.deployment.crimp import crimped_state
+from braidcast.deployment.net import braid_net, wire_section
 from braidcast.deployment.outcome import outcome
 from braidcast.deployment.position import RingPath, position
-from braidcast.deployment.release import ReleaseOptions, bending_stiffness, release, wall
+from braidcast.deployment.release import ReleaseOptions, release, wall
 from braidcast.deployment.result import Deployment
 from braidcast.devices import Braid
 from braidcast.mechanics import Equilibrium, Joints, NewtonOptions, Problem, State
@@ -82,13 +83,11 @@ def _position(
     braid: Braid,
     progress: Callable[[float], None],
 ) -> tuple[Equilibrium, int]:
-    unit = bending_stiffness(braid) / braid.segment_length**3
-    options = NewtonOptions(
-        tolerance=0.1 * bending_stiffness(braid) / braid.axis_radius**2,
-        largest_step=0.3,
-    )
+    bending = wire_section(braid).EIy
+    options = NewtonOptions(tolerance=0.1 * bending / braid.axis_radius**2, largest_step=0.3)
+    stiffness = 0.1 * bending / braid.segment_length**3
     free = system.with_contacts(())
-    return position(free, crimped, np.array(braid.rings), path, 0.1 * unit, options, progress)
+    return position(free, crimped, np.array(braid.rings), path, stiffness, options, progress)
 
 
 def _deployment(

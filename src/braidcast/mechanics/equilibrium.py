@@ -180,8 +180,11 @@ def follow_path(
     linear_solver: str = "block_tridiagonal",
     progress: Progress | None = None,
     path: tuple[float, float] = (0.0, 1.0),
+    memories: tuple[FrictionMemory, ...] | None = None,
 ) -> Equilibrium:
     """Raise loads and prescribed motion from one load factor to another, in adaptive steps.
+
+    ``memories``, from an earlier ``Equilibrium``, is the slip that walls hold at the start.
 
     A step that does not converge is halved, one that does quickly makes the next one longer; the
     path ends unconverged, with its reason and last state, when a step would be below
@@ -195,7 +198,7 @@ def follow_path(
     reached = begin
     iterations = 0
     result = None
-    memories = system.at_rest(state)
+    memories = system.at_rest(state) if memories is None else memories
     axial = None
     while result is None or reached != end:
         target = end if abs(end - reached) <= abs(size) * (1 + 1e-9) else reached + size
@@ -204,7 +207,7 @@ def follow_path(
             state,
             options,
             load_factor=target,
-            increment=(target - reached) * system.motion,
+            increment=(target - reached) * system.motion if system.motion.any() else None,
             axial=axial,
             memories=memories,
         )
