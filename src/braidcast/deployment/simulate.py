@@ -5,6 +5,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from braidcast.case import Case
 from braidcast.deployment.crimp import crimped_state
@@ -34,7 +35,20 @@ def simulate(
 
     A simulation that finds no equilibrium returns its last state with ``converged`` False and the
     reason. ``keep_frames`` keeps the crimped, positioned and all intermediate released shapes.
+
+    One BLAS thread is used: the blocks are small, and the answer is the same on any machine size.
     """
+    with threadpool_limits(1, "blas"):
+        return _simulate(case, options or ReleaseOptions(), progress, keep_frames, linear_solver)
+
+
+def _simulate(
+    case: Case,
+    options: ReleaseOptions,
+    progress: StageProgress | None,
+    keep_frames: bool,
+    linear_solver: str,
+) -> Deployment:
     wall_clock, cpu_clock = time.perf_counter(), time.process_time()
     report = progress or (lambda stage, fraction: None)
     braid = case.braid
@@ -56,7 +70,7 @@ def simulate(
             system,
             last.state,
             braid,
-            options or ReleaseOptions(),
+            options,
             axial=last.axial,
             keep_path=keep_frames,
             progress=partial(report, "release"),

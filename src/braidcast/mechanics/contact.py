@@ -21,7 +21,8 @@ import numba as nb
 import numpy as np
 
 from braidcast.errors import InputError
-from braidcast.mechanics.beams import BeamNet, IntArray, State
+from braidcast.mechanics.arrays import IntArray
+from braidcast.mechanics.beams import BeamNet, State
 from braidcast.mechanics.friction import FrictionMemory, friction_traction
 from braidcast.mechanics.rotations import Array
 

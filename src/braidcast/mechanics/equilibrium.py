@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from braidcast.mechanics.beams import State, axial_forces
+from braidcast.mechanics.beams import State
 from braidcast.mechanics.block_tridiagonal import NotPositiveDefinite
+from braidcast.mechanics.corotational import axial_forces
 from braidcast.mechanics.friction import FrictionMemory
 from braidcast.mechanics.linear_solvers import Solve
 from braidcast.mechanics.problem import Problem

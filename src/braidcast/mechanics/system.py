@@ -7,8 +7,10 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
-from braidcast.mechanics.beams import IntArray, State, beam_energy
+from braidcast.mechanics.arrays import IntArray
+from braidcast.mechanics.beams import State
 from braidcast.mechanics.contact import BeamContact, Contact, ContactForces
+from braidcast.mechanics.corotational import beam_energy
 from braidcast.mechanics.friction import FrictionMemory
 from braidcast.mechanics.linear_solvers import Factorise, breadth_first_levels, solver
 from braidcast.mechanics.problem import Problem
