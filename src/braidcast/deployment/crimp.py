@@ -7,8 +7,10 @@ crimped radius alone, so it is computed once and kept.
 
 import hashlib
 import os
+from contextlib import suppress
 from dataclasses import astuple
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from platformdirs import user_cache_path
@@ -78,9 +80,9 @@ def crimped_state(braid: Braid, crimped_radius: float, progress: Progress | None
     """
     path = _cache_file(braid, crimped_radius)
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
             return State(stored["positions"], stored["rotations"])
-    except (OSError, ValueError, KeyError, EOFError):
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
         pass
     result = crimp(braid, crimped_radius, progress=progress)
     if not result.converged:
@@ -94,8 +96,10 @@ def crimped_state(braid: Braid, crimped_radius: float, progress: Progress | None
             os.fsync(file.fileno())
         os.replace(temporary, path)
     except OSError:
-        # a cache that cannot be written costs time, not the result
-        temporary.unlink(missing_ok=True)
+        pass  # a cache that cannot be written costs time, not the result
+    finally:
+        with suppress(OSError):
+            temporary.unlink()
     return result.state
 
 

@@ -114,7 +114,8 @@ def _deployment(
     seconds: tuple[float, float],
 ) -> Deployment:
     braid, state = case.braid, last.state
-    evaluation = system.evaluate(state, memories=last.memories, tangent=False)
+    # positioning knows no wall, and leaves none of its memories
+    evaluation = system.evaluate(state, memories=last.memories or None, tangent=False)
     contacts = evaluation.contacts[0]
     total = contacts.total
     wire_distance = -case.vessel_geometry.distance(state.positions) - braid.wire_radius
