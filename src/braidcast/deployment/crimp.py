@@ -8,7 +8,7 @@ crimped radius alone, so it is computed once and kept.
 import hashlib
 import os
 from contextlib import suppress
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -31,6 +31,14 @@ from braidcast.mechanics.equilibrium import Progress
 
 VERSION = 2
 """Raised whenever the crimped state of the same device would come out differently."""
+
+
+class CrimpingFailed(Exception):
+    """No equilibrium at the crimped radius; ``equilibrium`` is the last state, with the reason."""
+
+    def __init__(self, equilibrium: Equilibrium) -> None:
+        super().__init__(equilibrium.reason)
+        self.equilibrium = equilibrium
 
 
 def crimp(
@@ -76,17 +84,18 @@ def crimped_state(braid: Braid, crimped_radius: float, progress: Progress | None
     The cache is ``BRAIDCAST_CACHE`` or the user's cache folder; a file there is named by all that
     it depends on, written whole or not at all, and computed anew when unreadable.
 
-    Raises RuntimeError if crimping does not converge.
+    Raises CrimpingFailed if crimping does not converge.
     """
     path = _cache_file(braid, crimped_radius)
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
+        with path.open("rb") as kept, np.load(kept, allow_pickle=False) as stored:
             return State(stored["positions"], stored["rotations"])
     except (OSError, ValueError, KeyError, EOFError, BadZipFile):
         pass
     result = crimp(braid, crimped_radius, progress=progress)
     if not result.converged:
-        raise RuntimeError(f"crimping to {crimped_radius} mm failed: {result.reason}")
+        reason = f"crimping to {crimped_radius} mm failed: {result.reason}"
+        raise CrimpingFailed(replace(result, reason=reason))
     temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

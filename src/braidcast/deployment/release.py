@@ -18,11 +18,14 @@ from braidcast.mechanics.relaxation import RelaxationOptions, relax
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import Springs, System
 
-WALL_STIFFNESS = 12.0
+WALL_STIFFNESS = 50.0
 """Line force per penetration of the stiff wall, in EI/l^4 with l the length of an element."""
 
-YIELDING = (0.01, 0.06, 0.3)
-"""Share of that stiffness while the braid moves, and on the way to the stiff wall."""
+YIELDING = 0.0025
+"""Share of that stiffness while the braid moves."""
+
+HARDENING = 5.0
+"""Largest factor by which the wall is then made stiffer at once."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +52,13 @@ class Release:
     path: tuple[Array, ...]
 
 
-def wall(braid: Braid, surface: SignedDistance, friction: float, share: float = 1.0) -> Contact:
-    """Contact of the braid's wires with a wall of a share of the full stiffness."""
+def wall(braid: Braid, surface: SignedDistance, friction: float) -> Contact:
+    """Contact of the braid's wires with a vessel's wall."""
     unit = wire_section(braid).EIy / braid.segment_length**4
     return Contact(
         surface,
         wire_radius=braid.wire_radius,
-        stiffness=share * WALL_STIFFNESS * unit,
+        stiffness=WALL_STIFFNESS * unit,
         threshold=braid.wire_radius / 4.0,
         friction=friction,
         stick_stiffness=4.0 * unit,
@@ -69,14 +72,12 @@ def release(
     options: ReleaseOptions,
     *,
     axial: Array | None = None,
-    keep_path: bool = False,
     progress: Progress | None = None,
 ) -> Release:
     """Let go of a positioned braid; ``system`` has the wall as its only contact.
 
     Returns the last state, converged or not, with the reason.
     """
-    stiff = system.problem.contacts[0]
     force = wire_section(braid).EIy / braid.axis_radius**2
     drag = 1.0
     natural_time = drag * braid.axis_radius**2 / (force * braid.segment_length)
@@ -86,9 +87,8 @@ def release(
         largest_step=options.move,
         largest_turn=0.6,
     )
-    yielding = system.with_contacts((_softened(stiff, YIELDING[0]),))
     motion = relax(
-        yielding,
+        _softened(system, YIELDING),
         positioned,
         RelaxationOptions(
             drag=drag,
@@ -99,41 +99,58 @@ def release(
             newton=newton_options,
         ),
         axial=axial,
-        keep_path=keep_path,
         progress=progress,
     )
-    last, iterations = motion.last, motion.iterations
     if not motion.completed:
-        return Release(
-            replace(last, converged=False, reason=motion.reason), iterations, motion.path
-        )
-    drags = Springs(
-        stiffness=np.full(len(positioned.positions), drag / (0.6 * natural_time)),
-        targets=last.state.positions,
-    )
-    for share in (*YIELDING[1:], 1.0):
-        hardened = system.with_contacts((_softened(stiff, share),))
-        last = newton(
-            hardened,
-            last.state,
-            replace(newton_options, iterations=40),
-            axial=last.axial,
-            springs=drags,
-            memories=last.memories,
-        )
-        iterations += last.iterations
-        last = replace(last, memories=remembered(last))
-        drags = replace(drags, targets=last.state.positions)
-    total = sum(contact.total for contact in last.evaluation.contacts)
+        last = replace(motion.last, converged=False, reason=motion.reason)
+        return Release(last, motion.iterations, motion.path)
+    stiffness = np.full(len(positioned.positions), drag / (0.6 * natural_time))
+    hard, iterations = _harden(system, motion.last, stiffness, newton_options)
+    iterations += motion.iterations
+    if not hard.converged:
+        return Release(hard, iterations, motion.path)
+    total = sum(contact.total for contact in hard.evaluation.contacts)
     last = newton(
         system,
-        last.state,
+        hard.state,
         replace(newton_options, iterations=40, tolerance=options.balance * total),
-        axial=last.axial,
-        memories=last.memories,
+        axial=hard.axial,
+        memories=hard.memories,
     )
     return Release(last, iterations + last.iterations, motion.path)
 
 
-def _softened(contact: Contact, share: float) -> Contact:
-    return replace(contact, stiffness=share * contact.stiffness)
+def _harden(
+    system: System, start: Equilibrium, drag: Array, options: NewtonOptions
+) -> tuple[Equilibrium, int]:
+    """Stiffen the wall step by step against a ``drag`` (N,) N/mm; shorter steps where one fails.
+
+    Returns the equilibrium at full stiffness, or the last attempt, and all Newton iterations.
+    """
+    options = replace(options, iterations=15)
+    last, share, factor, iterations = start, YIELDING, HARDENING, 0
+    while True:
+        target = min(1.0, share * factor)
+        attempt = newton(
+            _softened(system, target),
+            last.state,
+            options,
+            axial=last.axial,
+            springs=Springs(drag, last.state.positions),
+            memories=last.memories,
+        )
+        iterations += attempt.iterations
+        if attempt.converged:
+            last, share = replace(attempt, memories=remembered(attempt)), target
+            if share == 1.0:
+                return last, iterations
+        elif factor > 1.05:
+            factor = np.sqrt(factor)
+        else:
+            reason = f"the wall could not be stiffened beyond {share:.3g}: {attempt.reason}"
+            return replace(attempt, reason=reason), iterations
+
+
+def _softened(system: System, share: float) -> System:
+    contact = system.problem.contacts[0]
+    return system.with_contacts((replace(contact, stiffness=share * contact.stiffness),))

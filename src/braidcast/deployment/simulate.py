@@ -8,7 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from braidcast.case import Case
-from braidcast.deployment.crimp import crimped_state
+from braidcast.deployment.crimp import CrimpingFailed, crimped_state
 from braidcast.deployment.net import braid_net, wire_section
 from braidcast.deployment.outcome import outcome
 from braidcast.deployment.position import RingPath, position
@@ -16,11 +16,14 @@ from braidcast.deployment.release import ReleaseOptions, release, wall
 from braidcast.deployment.result import Deployment
 from braidcast.devices import Braid
 from braidcast.mechanics import Equilibrium, Joints, NewtonOptions, Problem, State
+from braidcast.mechanics.arrays import IntArray
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import System
 
+STAGES = ("crimp", "position", "release")
+
 StageProgress = Callable[[str, float], None]
-"""Called with the stage ("crimp", "position", "release") and the share of it that is done."""
+"""Called with the stage and the share of it that is done."""
 
 
 def simulate(
@@ -50,44 +53,69 @@ def _simulate(
     linear_solver: str,
 ) -> Deployment:
     wall_clock, cpu_clock = time.perf_counter(), time.process_time()
-    report = progress or (lambda stage, fraction: None)
     braid = case.braid
-    rings = np.array(braid.rings)
-    crimped = crimped_state(braid, case.crimped_radius, partial(report, "crimp"))
-    report("crimp", 1.0)
-    heights = np.bincount(rings, weights=crimped.positions[:, 2]) / np.bincount(rings)
-    arc_lengths = case.start_arc_length + heights - heights[0]
-    path = RingPath.along(case.centreline.at_arc_length(arc_lengths))
-    contact = wall(braid, case.vessel_geometry, case.wall.friction)
-    joints = Joints(np.array(braid.crossings))
-    problem = Problem(braid_net(braid), joints=joints, contacts=(contact,), levels=rings)
+    problem = Problem(
+        braid_net(braid),
+        joints=Joints(np.array(braid.crossings)),
+        contacts=(wall(braid, case.vessel_geometry, case.wall.friction),),
+        levels=np.array(braid.rings),
+    )
     system = System(problem, linear_solver)
-    frames = [("free", np.array(braid.positions)), ("crimp", crimped.positions)]
-    last, iterations = _position(system, crimped, path, braid, partial(report, "position"))
-    if last.converged:
-        frames.append(("position", last.state.positions))
-        released = release(
-            system,
-            last.state,
-            braid,
-            options,
-            axial=last.axial,
-            keep_path=keep_frames,
-            progress=partial(report, "release"),
-        )
-        last = released.equilibrium
-        iterations += released.iterations
-        frames += [("release", positions) for positions in released.path]
-    report("release", 1.0)
+    frames = [("free", np.array(braid.positions))]
+    last, iterations = _stages(case, system, options, progress or _no_progress, frames)
+    reached = dict(frames)
+    under_way = next((stage for stage in STAGES if stage not in reached), STAGES[-1])
+    frames.append((under_way, last.state.positions))
     return _deployment(
         case,
         system,
         last,
         iterations,
-        heights[-1] - heights[0],
-        [*frames, ("release", last.state.positions)] if keep_frames else [],
+        frames if keep_frames else [],
+        _length(reached.get("crimp", last.state.positions), np.array(braid.rings)),
         (time.perf_counter() - wall_clock, time.process_time() - cpu_clock),
     )
+
+
+def _no_progress(stage: str, fraction: float) -> None:
+    pass
+
+
+def _stages(
+    case: Case,
+    system: System,
+    options: ReleaseOptions,
+    report: StageProgress,
+    frames: list[tuple[str, Array]],
+) -> tuple[Equilibrium, int]:
+    """Crimp, position, release; adds to ``frames``. Returns the last state and all iterations."""
+    braid = case.braid
+    try:
+        crimped = crimped_state(braid, case.crimped_radius, partial(report, "crimp"))
+    except CrimpingFailed as failure:
+        return failure.equilibrium, failure.equilibrium.iterations
+    report("crimp", 1.0)
+    frames.append(("crimp", crimped.positions))
+    rings = np.array(braid.rings)
+    heights = np.bincount(rings, weights=crimped.positions[:, 2]) / np.bincount(rings)
+    arc_lengths = case.start_arc_length + heights - heights[0]
+    path = RingPath.along(case.centreline.at_arc_length(arc_lengths))
+    positioned, iterations = _position(system, crimped, path, braid, partial(report, "position"))
+    if not positioned.converged:
+        return positioned, iterations
+    report("position", 1.0)
+    frames.append(("position", positioned.state.positions))
+    released = release(
+        system,
+        positioned.state,
+        braid,
+        options,
+        axial=positioned.axial,
+        progress=partial(report, "release"),
+    )
+    report("release", 1.0)
+    frames += [("release", positions) for positions in released.path]
+    return released.equilibrium, iterations + released.iterations
 
 
 def _position(
@@ -109,8 +137,8 @@ def _deployment(
     system: System,
     last: Equilibrium,
     iterations: int,
-    crimped_length: float,
     frames: list[tuple[str, Array]],
+    crimped_length: float,
     seconds: tuple[float, float],
 ) -> Deployment:
     braid, state = case.braid, last.state
@@ -120,10 +148,6 @@ def _deployment(
     total = contacts.total
     wire_distance = -case.vessel_geometry.distance(state.positions) - braid.wire_radius
     labels = outcome(case, state.positions, wire_distance)
-    rings = np.array(braid.rings)
-    centres = np.array(
-        [np.bincount(rings, weights=state.positions[:, i]) / np.bincount(rings) for i in range(3)]
-    ).T
     return Deployment(
         case=case,
         positions=state.positions,
@@ -141,11 +165,18 @@ def _deployment(
         residual_relative=last.residual / total if total > 0.0 else float("nan"),
         strain_energy_mJ=evaluation.strain_energy,
         max_penetration_mm=contacts.penetration,
-        crimped_length_mm=float(crimped_length),
-        deployed_length_mm=float(np.linalg.norm(np.diff(centres, axis=0), axis=1).sum()),
+        crimped_length_mm=crimped_length,
+        deployed_length_mm=_length(state.positions, np.array(braid.rings)),
         free_length_mm=braid.length,
         end_nodes_in_sac=labels.end_nodes_in_sac,
         wall_seconds=seconds[0],
         cpu_seconds=seconds[1],
         frames=frames,
     )
+
+
+def _length(positions: Array, rings: IntArray) -> float:
+    """Length of the line through the ring centres, mm."""
+    count = np.bincount(rings)
+    centres = [np.bincount(rings, weights=positions[:, i]) / count for i in range(3)]
+    return float(np.linalg.norm(np.diff(centres, axis=1), axis=0).sum())

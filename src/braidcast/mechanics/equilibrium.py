@@ -185,11 +185,10 @@ def follow_path(
 ) -> Equilibrium:
     """Raise loads and prescribed motion from one load factor to another, in adaptive steps.
 
-    ``memories``, from an earlier ``Equilibrium``, is the slip that walls hold at the start.
-
     A step that does not converge is halved, one that does quickly makes the next one longer; the
     path ends unconverged, with its reason and last state, when a step would be below
-    ``smallest_step``.
+    ``smallest_step`` of it. ``memories``, from an earlier ``Equilibrium``, is the slip that walls
+    hold at the start.
     """
     options = options or NewtonOptions()
     system = System(problem, linear_solver)

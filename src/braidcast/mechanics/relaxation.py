@@ -51,7 +51,7 @@ class Relaxation:
     steps: int
     iterations: int
     path: tuple[Array, ...]
-    """Positions after every step, when they were asked for."""
+    """Positions (N, 3) after every step."""
 
 
 def relax(
@@ -60,7 +60,6 @@ def relax(
     options: RelaxationOptions,
     *,
     axial: Array | None = None,
-    keep_path: bool = False,
     progress: Progress | None = None,
 ) -> Relaxation:
     """Let go of a net at ``start`` and follow it for the duration."""
@@ -93,8 +92,7 @@ def relax(
             continue
         time, steps = time + step, steps + 1
         state, axial, memories = attempt.state, attempt.axial, remembered(attempt)
-        if keep_path:
-            path.append(state.positions)
+        path.append(state.positions)
         if progress is not None:
             scale = options.first_step
             progress(float(np.log1p(time / scale) / np.log1p(options.duration / scale)))

@@ -28,10 +28,11 @@ class Springs:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The potential at a state: ``energy`` mJ without loads and springs, ``strain_energy`` mJ.
+    """The potential at a state.
 
-    ``gradient`` (n,) over the free unknowns; ``data`` the tangent's CSR values; ``nodal`` (N, 6)
-    unbalanced force and moment before supports are applied, global axes.
+    ``strain_energy`` of the beams, mJ; ``gradient`` (n,) over the free unknowns; ``data`` the
+    tangent's CSR values; ``nodal`` (N, 6) unbalanced force and moment before supports are applied,
+    global axes.
     """
 
     strain_energy: float
