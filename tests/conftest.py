@@ -1,5 +1,8 @@
 """Shared by the tests: a case, and a deployment made up from geometry alone."""
 
+import os
+import shutil
+import tempfile
 from typing import Any
 
 import numpy as np
@@ -7,13 +10,24 @@ import pytest
 
 from braidcast.case import Case
 from braidcast.deployment.result import Deployment
+from braidcast.deployment.simulate import simulate
+
+_cache = pytest.StashKey[str]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Compile before parallel workers start: two that first compile the same code can collide."""
-    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
-        vessel = bent_along_vessel(Case.from_dict(plain_tables())).case.vessel_geometry
-        vessel.evaluate(np.zeros((1, 3)))
+    """Give all workers one new cache; compile before they start, for two at once can collide."""
+    if hasattr(config, "workerinput"):
+        return
+    config.stash[_cache] = tempfile.mkdtemp(prefix="braidcast-tests-")
+    os.environ["BRAIDCAST_CACHE"] = config.stash[_cache]
+    if getattr(config.option, "numprocesses", None):
+        simulate(Case.from_dict(plain_tables()))
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    if _cache in config.stash:
+        shutil.rmtree(config.stash[_cache], ignore_errors=True)
 
 
 @pytest.fixture
