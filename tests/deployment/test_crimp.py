@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from braidcast.deployment import crimp as module
-from braidcast.deployment.crimp import crimp, crimped_state
+from braidcast.deployment.crimp import CrimpingFailed, crimp, crimped_state
 from braidcast.devices import Braid
 from braidcast.errors import InputError
 from braidcast.mechanics import Equilibrium, Joints, State
@@ -160,6 +160,6 @@ def test_failure_to_crimp_is_said_and_not_kept(
 ) -> None:
     options = module.NewtonOptions
     monkeypatch.setattr(module, "NewtonOptions", lambda **given: options(**given, iterations=0))
-    with pytest.raises(RuntimeError, match="crimping to 0.8 mm failed: stopped at load factor"):
+    with pytest.raises(CrimpingFailed, match="crimping to 0.8 mm failed: stopped at load factor"):
         crimped_state(SMALL, 0.8)
     assert not cache.exists()

@@ -16,7 +16,7 @@ from braidcast.case import Case
 from braidcast.deployment import position, release
 from braidcast.deployment.result import Deployment
 from braidcast.deployment.simulate import simulate
-from braidcast.mechanics import Equilibrium, NewtonOptions, State, relaxation
+from braidcast.mechanics import Equilibrium, NewtonOptions, State, equilibrium, relaxation
 from braidcast.mechanics.equilibrium import newton
 from braidcast.mechanics.system import System
 
@@ -109,6 +109,7 @@ def starved(system: System, state: State, options: NewtonOptions, **others: Any)
 
 
 FAILURES = {
+    "crimping to 0.7842 mm failed: stopped at load factor 0": equilibrium,
     "positioning stopped at 0 of the bend": position,
     "the motion stopped after 0 of": relaxation,
     "no equilibrium within 0 Newton iterations": release,
@@ -117,8 +118,9 @@ FAILURES = {
 
 @pytest.mark.parametrize("reason", FAILURES)
 def test_no_equilibrium_is_said_with_the_last_state(
-    reason: str, small: Case, monkeypatch: pytest.MonkeyPatch
+    reason: str, small: Case, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    monkeypatch.setenv("BRAIDCAST_CACHE", str(tmp_path))
     monkeypatch.setattr(FAILURES[reason], "newton", starved)
     result = simulate(small)
     assert not result.converged
@@ -135,6 +137,7 @@ def test_the_command_ends_with_3_and_writes_the_last_state(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.setenv("BRAIDCAST_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(FAILURES[reason], "newton", starved)
     assert run(small, monkeypatch, tmp_path) == 3
     assert reason in capsys.readouterr().err

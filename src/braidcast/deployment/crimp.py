@@ -94,7 +94,7 @@ def crimped_state(braid: Braid, crimped_radius: float, progress: Progress | None
         pass
     result = crimp(braid, crimped_radius, progress=progress)
     if not result.converged:
-        reason = f"crimping to {crimped_radius} mm failed: {result.reason}"
+        reason = f"crimping to {crimped_radius:.4g} mm failed: {result.reason}"
         raise CrimpingFailed(replace(result, reason=reason))
     temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     try:
