@@ -131,7 +131,9 @@ def flip(content: bytes) -> bytes:
 
 
 @pytest.mark.parametrize(
-    "spoil", [shorten, flip, lambda _: b"", lambda _: b"not at all numpy's"], ids=str
+    "spoil",
+    [shorten, flip, lambda _: b"", lambda _: b"not at all numpy's"],
+    ids=["half", "one byte wrong", "empty", "of another kind"],
 )
 def test_a_spoilt_file_is_computed_anew(
     spoil: Callable[[bytes], bytes], cache: Path, crimps: list[float]
