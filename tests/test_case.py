@@ -2,6 +2,7 @@
 
 import math
 import os
+import tomllib
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from scipy.stats import qmc
 
 from braidcast import Case, InputError
+from braidcast.vessels import QuadraticBezier
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -37,14 +39,28 @@ def complaint(tables: Any) -> str:
     return text
 
 
-@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
-def test_examples_are_in_the_range_of_the_study(path: Path) -> None:
-    case = Case.from_toml(path)
+@pytest.mark.parametrize("name", ["success", "failure_end_in_sac"])
+def test_examples_are_in_the_range_of_the_study(name: str) -> None:
+    case = Case.from_toml(EXAMPLES / f"{name}.toml")
     _, y, z = case.vessel.P1
-    assert case.title
     assert 5.0 <= y <= 30.0 and 18.0 <= z <= 32.0 and 2.0 <= case.vessel.diameter <= 4.0
     assert case.aneurysm is not None and case.aneurysm.protrusion is not None
     assert 5.0 <= case.aneurysm.diameter <= 10.0 and 0.3 <= case.aneurysm.protrusion <= 0.8
+
+
+def test_the_strongly_curved_example_is_bent_beyond_the_study() -> None:
+    case = Case.from_toml(EXAMPLES / "strongly_curved.toml")
+    tightest = QuadraticBezier(*np.array([[0.0, 0.0, 0.0], [0.0, 30.0, 18.0], [0.0, 0.0, 50.0]]))
+    assert case.centreline.max_curvature > 2.0 * tightest.max_curvature
+    assert case.vessel_radius * case.centreline.max_curvature == pytest.approx(0.2)
+    assert case.aneurysm is not None
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
+def test_examples_have_titles_and_survive_rewriting(path: Path) -> None:
+    case = Case.from_toml(path)
+    assert case.title
+    assert Case.from_dict(tomllib.loads(case.to_toml())) == case
 
 
 def test_defaults_are_the_papers(tables: dict[str, Any]) -> None:
@@ -101,7 +117,7 @@ def test_every_case_of_the_studys_range_is_feasible(tables: dict[str, Any]) -> N
         ("vessel.P1", [0.0, 600.0, 25.0], "bends the centreline to a radius of"),
         ("vessel.P2", [0.0, 0.0, 0.0], "vessel."),
         ("vessel.diameter", "3", "vessel.diameter = '3' must be a number of mm"),
-        ("vessel.diameter", True, "vessel.diameter = True must be a number"),
+        ("vessel.diameter", True, "vessel.diameter = true must be a number"),
         ("vessel.diameter", math.nan, "vessel.diameter = nan must be a number"),
         ("vessel.diameter", math.inf, "vessel.diameter = inf must be a number"),
         ("vessel.diameter", -3.0, "vessel.diameter = -3.0 must be a number of mm above 0"),
@@ -242,3 +258,11 @@ def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(InputError, match="cannot be read: Permission denied"):
         Case.from_toml(EXAMPLES / "success.toml")
+
+
+@pytest.mark.parametrize("value", ["true", "1979-05-27", "07:32:00"])
+def test_complaints_show_values_as_the_case_file_has_them(
+    tables: dict[str, Any], value: str
+) -> None:
+    with pytest.raises(InputError, match=f"site.eta = {value} must be a number from 0 to 1"):
+        Case.from_dict(spoilt(tables, "site.eta", tomllib.loads(f"eta = {value}")["eta"]))

@@ -133,6 +133,7 @@ def test_bad_input_ends_before_the_simulation(
         (["negative.toml"], "vessel.diameter = -3.0 must be"),
         ([case_file, "-o", case_file], "is a file"),
         ([case_file, "-o", "no/such/folder"], "must be in a folder that exists"),
+        ([case_file, "-o", ""], 'output folder = "" must be the name of a folder'),
     ]:
         assert run("simulate", *arguments) == 2, arguments
         out, err = capsys.readouterr()
@@ -156,6 +157,7 @@ def test_not_converged_is_written_and_said(
     monkeypatch.setattr(picture, "find_spec", lambda name: None)
     assert run("simulate", case_file, "-o", "out") == 3
     out, err = capsys.readouterr()
+    assert "outcome               success, so far: not at rest" in out
     assert "NOT reached: the step became too small" in out
     assert "braidcast: not converged: the step became too small" in err
     read = json.loads((case_file.parent / "out" / "summary.json").read_text())
@@ -175,7 +177,8 @@ def test_a_full_disk_is_one_sentence(
 
     monkeypatch.setattr(os, "fsync", full)
     assert run("simulate", case_file, "-o", "out") == 1
-    assert "the results could not be written: No space left on device" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "the results could not be written: out: No space left on device" in said
     assert not (case_file.parent / "out").exists()
 
 

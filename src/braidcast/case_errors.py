@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from datetime import date, time
 from difflib import get_close_matches
 from typing import Any, get_args
 
@@ -93,6 +94,10 @@ def _value(keys: list[str], data: Any) -> Any:
 
 
 def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (date, time)):
+        return value.isoformat()
     try:
         text = repr(value)
     except ValueError:  # an integer of more digits than Python agrees to print

@@ -58,7 +58,7 @@ def _options(
 def simulate(
     case: Annotated[Path, typer.Argument(metavar="CASE.toml", help="The case file.")],
     output: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             "--output",
             "-o",
@@ -84,14 +84,17 @@ def simulate(
         from braidcast.deployment.output import check_folder, write_deployment
 
         given = Case.from_toml(case)
-        folder = Path(f"{case.stem}_deployed") if output is None else output
+        folder = f"{case.stem}_deployed" if output is None else output
         check_folder(folder)
 
         from braidcast.deployment.simulate import simulate as deploy
 
         with _bars() as progress:
             deployment = deploy(given, progress=progress, keep_frames=frames)
-        written = write_deployment(deployment, folder, frames=frames)
+        try:
+            written = write_deployment(deployment, folder, frames=frames)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror or str(error), folder) from None
         for note in written.notes:
             _say(note)
         typer.echo(_report(deployment, written.files))
@@ -125,6 +128,7 @@ class _Bars:
 @contextmanager
 def _bars() -> Iterator[_Bars]:
     bars = _Bars()
+    bars("crimp", 0.0)  # the first run of all compiles for some seconds before it says anything
     with bars.display:
         yield bars
 
@@ -132,7 +136,7 @@ def _bars() -> Iterator[_Bars]:
 def _report(deployment: Deployment, files: list[Path]) -> str:
     d = deployment
     rows = [
-        ("outcome", d.outcome),
+        ("outcome", d.outcome if d.converged else f"{d.outcome}, so far: not at rest"),
         ("clinical outcome", d.clinical_outcome),
         ("end nodes in the sac", f"{d.end_nodes_in_sac}"),
         ("deployed length", f"{d.deployed_length_mm:.3f} mm"),

@@ -40,6 +40,8 @@ def check_folder(folder: str | Path) -> None:
 
     The folder may be missing, its parent may not. Nothing stays behind.
     """
+    if folder == "":
+        raise InputError('output folder = "" must be the name of a folder, "." for this one')
     folder = Path(folder)
     try:
         if folder.exists() and not folder.is_dir():
@@ -78,8 +80,8 @@ def write_deployment(
     none. The picture needs ``braidcast[pictures]``; without it a note says so. ``InputError`` if
     ``folder`` cannot be used, ``OSError`` if the disk is full.
     """
-    folder = Path(folder)
     check_folder(folder)
+    folder = Path(folder)
     surface = vessel_surface(deployment.case.vessel_geometry)
     with _workplace(folder) as work:
         _write_wires(work / "deployed.vtp", deployment)
