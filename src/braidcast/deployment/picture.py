@@ -196,7 +196,7 @@ def _add_ruler(plotter: pyvista.Plotter, view: _View) -> None:
     import pyvista
 
     half = view.half_height * np.array([SIZE[0] / SIZE[1], 1.0])
-    length = max(n for n in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if n <= max(0.1, half[0] / 3))
+    length = max(n for n in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if n <= max(0.1, half[0] / 2))
     left, low = -0.97 * half[0], -0.88 * half[1]
     # Nearer to the eye than anything else, so that nothing hides it.
     plane = view.centre + 100.0 * view.eye + low * view.up
