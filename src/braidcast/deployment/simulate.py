@@ -62,7 +62,7 @@ def _simulate(
     )
     system = System(problem, linear_solver)
     frames = [("free", np.array(braid.positions))]
-    last, iterations = _stages(case, system, options, progress or _no_progress, frames)
+    system, last, iterations = _stages(case, system, options, progress or _no_progress, frames)
     reached = dict(frames)
     under_way = next((stage for stage in STAGES if stage not in reached), STAGES[-1])
     frames.append((under_way, last.state.positions))
@@ -87,13 +87,16 @@ def _stages(
     options: ReleaseOptions,
     report: StageProgress,
     frames: list[tuple[str, Array]],
-) -> tuple[Equilibrium, int]:
-    """Crimp, position, release; adds to ``frames``. Returns the last state and all iterations."""
+) -> tuple[System, Equilibrium, int]:
+    """Crimp, position, release; adds to ``frames``.
+
+    Returns the system of the last state, that state, and all Newton iterations.
+    """
     braid = case.braid
     try:
         crimped = crimped_state(braid, case.crimped_radius, partial(report, "crimp"))
     except CrimpingFailed as failure:
-        return failure.equilibrium, failure.equilibrium.iterations
+        return system, failure.equilibrium, failure.equilibrium.iterations
     report("crimp", 1.0)
     frames.append(("crimp", crimped.positions))
     rings = np.array(braid.rings)
@@ -102,7 +105,7 @@ def _stages(
     path = RingPath.along(case.centreline.at_arc_length(arc_lengths))
     positioned, iterations = _position(system, crimped, path, braid, partial(report, "position"))
     if not positioned.converged:
-        return positioned, iterations
+        return system, positioned, iterations
     report("position", 1.0)
     frames.append(("position", positioned.state.positions))
     released = release(
@@ -115,7 +118,7 @@ def _stages(
     )
     report("release", 1.0)
     frames += [("release", positions) for positions in released.path]
-    return released.equilibrium, iterations + released.iterations
+    return released.system, released.equilibrium, iterations + released.iterations
 
 
 def _position(

@@ -94,41 +94,39 @@ class BlockTridiagonal:
 
     def _map_groups(self, indptr: IntArray, indices: IntArray) -> None:
         """For each group: its unknowns, its neighbours, and where their entries come from."""
-        size = int(self.group_of.max(initial=-1)) + 1
+        n, size = len(self.group_of), int(self.group_of.max(initial=-1)) + 1
         members = np.flatnonzero(self.group_of >= 0)
         members = members[np.argsort(self.group_of[members], kind="stable")]
+        own = np.bincount(self.group_of[members], minlength=size)
         self.members = members
-        self.member_at = np.concatenate(
-            [[0], np.cumsum(np.bincount(self.group_of[members], minlength=size))]
-        ).astype(np.int64)
-        neighbours, entries, targets = [], [], []
-        neighbour_at, entry_at, target_at = [0], [0], [0]
-        for g in range(size):
-            own = members[self.member_at[g] : self.member_at[g + 1]]
-            slots = [np.arange(indptr[m], indptr[m + 1]) for m in own]
-            columns = [indices[s] for s in slots]
-            around = np.sort(np.concatenate(columns))
-            around = around[np.diff(around, prepend=-1) != 0]
-            around = around[self.group_of[around] < 0]
-            entry = np.full((len(own), len(own) + len(around)), -1)
-            wanted = np.concatenate([own, around])
-            sorter = np.argsort(wanted)
-            for i, (s, c) in enumerate(zip(slots, columns, strict=True)):
-                entry[i, sorter[np.searchsorted(wanted, c, sorter=sorter)]] = s
-            grid = np.meshgrid(around, around, indexing="ij")
-            neighbours.append(around)
-            entries.append(entry.ravel())
-            targets.append(self._target(grid[0].ravel(), grid[1].ravel()))
-            neighbour_at.append(neighbour_at[-1] + len(around))
-            entry_at.append(entry_at[-1] + entry.size)
-            target_at.append(target_at[-1] + grid[0].size)
-        empty = [np.zeros(0, dtype=np.int64)]
-        self.neighbours = np.concatenate(neighbours or empty)
-        self.entries = np.concatenate(entries or empty)
-        self.targets = np.concatenate(targets or empty)
-        self.neighbour_at = np.array(neighbour_at)
-        self.entry_at = np.array(entry_at)
-        self.target_at = np.array(target_at)
+        self.member_at = _starts(own)
+        # all entries of the members' rows: group, row within it, column, place in the CSR values
+        length = indptr[members + 1] - indptr[members]
+        slot = np.repeat(indptr[members], length) + _count_up(length)
+        column = indices[slot]
+        group = np.repeat(self.group_of[members], length)
+        row = np.repeat(np.arange(len(members)) - self.member_at[self.group_of[members]], length)
+        outside = self.group_of[column] < 0
+        key = group * n + column
+        around = np.sort(key[outside])
+        around = around[np.diff(around, prepend=-1) != 0]
+        self.neighbours = around % n
+        beside = np.bincount(around // n, minlength=size)
+        self.neighbour_at = _starts(beside)
+        # each group keeps a dense block, its rows by [itself, its neighbours]
+        rank = np.zeros(n, dtype=np.int64)
+        rank[members] = np.arange(len(members))
+        inside_place = rank[column] - self.member_at[group]
+        outside_place = own[group] + np.searchsorted(around, key) - self.neighbour_at[group]
+        self.entry_at = _starts(own * (own + beside))
+        self.entries = np.full(self.entry_at[-1], -1)
+        place = np.where(outside, outside_place, inside_place)
+        self.entries[self.entry_at[group] + row * (own + beside)[group] + place] = slot
+        self.target_at = _starts(beside**2)
+        of = np.repeat(np.arange(size), beside**2)
+        first, second = np.divmod(_count_up(beside**2), beside[of])
+        base = self.neighbour_at[of]
+        self.targets = self._target(self.neighbours[base + first], self.neighbours[base + second])
 
     def factorise(self, data: Array) -> Callable[[Array], Array]:
         """Cholesky factor of the matrix with CSR values ``data``; returns the solution operator.
@@ -191,6 +189,16 @@ class BlockTridiagonal:
             return x
 
         return solve
+
+
+def _starts(lengths: IntArray) -> IntArray:
+    """Where each of consecutive pieces begins, and the last one ends."""
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+
+
+def _count_up(lengths: IntArray) -> IntArray:
+    """0, 1, ... within each of consecutive pieces."""
+    return np.arange(int(lengths.sum())) - np.repeat(_starts(lengths)[:-1], lengths)
 
 
 @nb.njit(cache=True)

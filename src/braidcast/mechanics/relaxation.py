@@ -27,15 +27,13 @@ class RelaxationOptions:
     """``drag`` N s/mm a node; ``duration`` and ``first_step`` s.
 
     ``largest_move`` mm is how far the fastest node should go in a step, ``growth`` how much longer
-    a step may be than the last. A step that ends with less than ``acceptable`` N unbalanced is
-    taken, one that does not is shortened.
+    a step may be than the last. A step whose equilibrium is not found is shortened.
     """
 
     drag: float
     duration: float
     first_step: float
     largest_move: float
-    acceptable: float
     newton: NewtonOptions
     growth: float = 2.0
     shortest_step: float = 1e-6
@@ -80,15 +78,14 @@ def relax(
         )
         iterations += attempt.iterations
         move = float(np.linalg.norm(attempt.state.positions - state.positions, axis=1).max())
-        balanced = attempt.converged or attempt.residual <= options.acceptable
-        if not balanced or move > 2.0 * options.largest_move:
+        if not attempt.converged or move > 2.0 * options.largest_move:
             if step <= options.shortest_step * options.duration:
                 reason = f"the motion stopped after {time:.3g} of {options.duration:.3g} s"
                 last = replace(attempt, state=state)
                 return Relaxation(
                     last, False, f"{reason}: {attempt.reason}", steps, iterations, tuple(path)
                 )
-            step *= max(0.3, 0.9 * options.largest_move / move) if balanced else 1.0 / 3.0
+            step *= max(0.3, 0.9 * options.largest_move / move) if attempt.converged else 1.0 / 3.0
             continue
         time, steps = time + step, steps + 1
         state, axial, memories = attempt.state, attempt.axial, remembered(attempt)
