@@ -44,7 +44,10 @@ class NewtonOptions:
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """How a solution ended: ``reason`` says why, in words; ``residual`` in N."""
+    """How a solution ended: ``reason`` says why, in words; ``residual`` in N.
+
+    ``residuals`` are those of all iterates, the first before any step.
+    """
 
     state: State
     converged: bool
@@ -55,6 +58,7 @@ class Equilibrium:
     evaluation: Evaluation
     axial: Array
     memories: tuple[FrictionMemory, ...]
+    residuals: tuple[float, ...]
 
 
 def residual_norm(system: System, gradient: Array) -> float:
@@ -113,6 +117,7 @@ def newton(
     reason = f"no equilibrium within {options.iterations} Newton iterations"
     converged = False
     iterations = 0
+    residuals: list[float] = []
     while True:
         evaluation = system.evaluate(
             state,
@@ -123,6 +128,7 @@ def newton(
             memories=memories,
         )
         residual = residual_norm(system, evaluation.gradient)
+        residuals.append(residual)
         if not np.isfinite(residual):
             reason = "the forces are no longer finite"
             break
@@ -155,6 +161,7 @@ def newton(
         evaluation,
         axial if axial is not None else np.full(len(net.elements), np.nan),
         memories,
+        tuple(residuals),
     )
 
 

@@ -21,6 +21,9 @@ from braidcast.mechanics.equilibrium import (
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import Springs, System
 
+HELD = 3.0
+"""Unbalanced forces, in tolerances of a step, that friction may hold."""
+
 
 @dataclass(frozen=True)
 class RelaxationOptions:
@@ -60,7 +63,12 @@ def relax(
     axial: Array | None = None,
     progress: Progress | None = None,
 ) -> Relaxation:
-    """Let go of a net at ``start`` and follow it for the duration."""
+    """Let go of a net at ``start`` and follow it for the duration, or until friction holds it.
+
+    Friction holds where less than ``HELD`` tolerances are unbalanced and a step, meant to bring
+    that down, only makes points stick and slip in turn.
+    """
+    last: Equilibrium | None = None
     memories = system.at_rest(start)
     drag = np.full(len(start.positions), options.drag)
     state, time, step = start, 0.0, options.first_step
@@ -78,22 +86,25 @@ def relax(
         )
         iterations += attempt.iterations
         move = float(np.linalg.norm(attempt.state.positions - state.positions, axis=1).max())
+        if last is not None and not attempt.converged:
+            if attempt.residuals[0] <= HELD * options.newton.tolerance:
+                return Relaxation(last, True, "held by friction", steps, iterations, tuple(path))
         if not attempt.converged or move > 2.0 * options.largest_move:
             if step <= options.shortest_step * options.duration:
                 reason = f"the motion stopped after {time:.3g} of {options.duration:.3g} s"
-                last = replace(attempt, state=state)
+                failed = replace(attempt, state=state)
                 return Relaxation(
-                    last, False, f"{reason}: {attempt.reason}", steps, iterations, tuple(path)
+                    failed, False, f"{reason}: {attempt.reason}", steps, iterations, tuple(path)
                 )
             step *= max(0.3, 0.9 * options.largest_move / move) if attempt.converged else 1.0 / 3.0
             continue
         time, steps = time + step, steps + 1
         state, axial, memories = attempt.state, attempt.axial, remembered(attempt)
+        last = replace(attempt, memories=memories)
         path.append(state.positions)
         if progress is not None:
             scale = options.first_step
             progress(float(np.log1p(time / scale) / np.log1p(options.duration / scale)))
         if time >= options.duration * (1.0 - 1e-12):
-            last = replace(attempt, memories=memories)
-            return Relaxation(last, True, "came to rest", steps, iterations, tuple(path))
+            return Relaxation(last, True, "the time is over", steps, iterations, tuple(path))
         step *= min(options.growth, max(0.3, options.largest_move / max(move, 1e-12)))
