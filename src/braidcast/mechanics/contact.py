@@ -6,8 +6,9 @@ The axis of a beam is the cubic through its nodes with their turned tangents,
 
 with t_i0 the reference tangents of ``BeamNet.end_tangents``,
 
-sampled at Gauss points. A point at gap ``g`` (depth inside the lumen less the wire's radius)
-carries the line force of reference length, regularised below the threshold ``h`` (errata row 10):
+sampled at Gauss-Lobatto points, the nodes among them. A point at gap ``g`` (depth inside the lumen
+less the wire's radius) carries the line force of reference length, regularised below the threshold
+``h`` (errata row 10):
 
     p(g) = k (h/2 - g)              g <= 0
          = k (g^2/(2h) - g + h/2)   0 < g <= h
@@ -40,8 +41,8 @@ class Contact:
     """A wall and the law by which it pushes and holds.
 
     ``stiffness`` k in N/mm^2 (line force per penetration), ``threshold`` h in mm, ``friction``
-    Coulomb's coefficient, ``points`` Gauss points an element, ``stick_stiffness`` in N/mm^2 the
-    tangential line force per elastic slip below Coulomb's limit.
+    Coulomb's coefficient, ``points`` Gauss-Lobatto points an element (2 or more),
+    ``stick_stiffness`` in N/mm^2 the tangential line force per elastic slip below Coulomb's limit.
     """
 
     surface: SignedDistance
@@ -49,7 +50,7 @@ class Contact:
     stiffness: float
     threshold: float
     friction: float = 0.0
-    points: int = 3
+    points: int = 4
     stick_stiffness: float = 1.0
 
     def __post_init__(self) -> None:
@@ -59,13 +60,13 @@ class Contact:
                 raise InputError(f"contact.{name} is {value}; it must be a positive number")
         if not (np.isfinite(self.friction) and self.friction >= 0.0):
             raise InputError(f"contact.friction is {self.friction}; it must be 0 or more")
-        if self.points < 1:
-            raise InputError(f"contact.points is {self.points}; it must be 1 or more")
+        if self.points < 2:
+            raise InputError(f"contact.points is {self.points}; it must be 2 or more")
 
 
 @dataclass(frozen=True)
 class ContactForces:
-    """Contact at the Gauss points: ``gap`` (n,) mm, normal and tangential force (n,) N.
+    """Contact at the sampled points: ``gap`` (n,) mm, normal and tangential force (n,) N.
 
     ``memory`` is what the wall remembers once this state has converged.
     """
@@ -104,14 +105,21 @@ def contact_law(gap: float, stiffness: float, threshold: float) -> tuple[float, 
     return energy, stiffness * (0.5 * h - gap), stiffness
 
 
+def lobatto(count: int) -> tuple[Array, Array]:
+    """Places on [0, 1], both ends among them, and weights (count,) of Gauss-Lobatto quadrature."""
+    legendre = np.polynomial.Legendre.basis(count - 1)
+    places = np.concatenate([[-1.0], np.sort(legendre.deriv().roots().real), [1.0]])
+    weights = 2.0 / (count * (count - 1) * legendre(places) ** 2)
+    return 0.5 * (places + 1.0), 0.5 * weights
+
+
 class BeamContact:
     """A ``Contact`` of one net: adds its forces and tangents to those of the elements."""
 
     def __init__(self, net: BeamNet, contact: Contact) -> None:
         self.net = net
         self.contact = contact
-        s, w = np.polynomial.legendre.leggauss(contact.points)
-        s, self.weights = 0.5 * (s + 1.0), 0.5 * w
+        s, self.weights = lobatto(contact.points)
         self.shape: Array = np.stack(
             [
                 1 - 3 * s**2 + 2 * s**3,
@@ -128,7 +136,7 @@ class BeamContact:
         self._tangential: Array = np.zeros(count)
 
     def axis_points(self, state: State) -> Array:
-        """Gauss points (M * points, 3) on the axes."""
+        """Sampled points (M * points, 3) on the axes."""
         net = self.net
         return _axis_points(
             state.positions,

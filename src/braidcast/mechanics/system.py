@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from braidcast.mechanics.arrays import IntArray
 from braidcast.mechanics.beams import State
-from braidcast.mechanics.contact import BeamContact, Contact, ContactForces
+from braidcast.mechanics.contact import BeamContact, Contact, ContactForces, lobatto
 from braidcast.mechanics.corotational import beam_energy
 from braidcast.mechanics.friction import FrictionMemory
 from braidcast.mechanics.linear_solvers import Factorise, breadth_first_levels, solver
@@ -280,7 +280,7 @@ class System:
         """Normal force (N,) N of a contact, each point's shared by the nodes of its element."""
         elements = self.problem.net.elements
         share = contact.normal.reshape(len(elements), -1)
-        points = (np.polynomial.legendre.leggauss(share.shape[1])[0] + 1.0) / 2.0
+        points = lobatto(share.shape[1])[0]
         count = len(self.problem.net.nodes)
         nodal = np.zeros(count)
         nodal += np.bincount(elements[:, 0], share @ (1.0 - points), count)
