@@ -33,13 +33,13 @@ class ReleaseOptions:
     """Accuracy of the release.
 
     ``duration`` in natural times of the braid (drag against the bending of its rings); ``move``
-    the largest step of a node, mm; ``tolerance`` the unbalanced force of a step in EI/R^2; the
-    final equilibrium is ``balance`` times the sum of the contact forces.
+    the largest step of a node, mm; ``tolerance`` the unbalanced force of a step, in EI/R^2 a wire;
+    ``balance`` that of the final equilibrium, as a share of the sum of the contact forces.
     """
 
     duration: float = 12.0
     move: float = 0.25
-    tolerance: float = 3.0
+    tolerance: float = 0.0625
     balance: float = 1e-5
 
 
@@ -83,7 +83,7 @@ def release(
     drag = 1.0
     natural_time = drag * braid.axis_radius**2 / (force * braid.segment_length)
     newton_options = NewtonOptions(
-        tolerance=options.tolerance * force,
+        tolerance=options.tolerance * braid.wires * force,
         iterations=8,
         largest_step=options.move,
         largest_turn=0.6,
