@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from braidcast.case import Case
+from braidcast.deployment.crimp import crimped_state
 from braidcast.deployment.net import braid_net
 from braidcast.deployment.release import ReleaseOptions, wall
 from braidcast.deployment.result import Deployment
@@ -138,3 +140,21 @@ def test_a_finer_answer_is_the_same_answer(success: Deployment) -> None:
     finer = simulate(success.case, options=replace(options, move=options.move / 2.0))
     apart = np.linalg.norm(finer.positions - success.positions, axis=1)
     assert apart.mean() < 5e-3 and apart.max() < 20e-3
+
+
+def test_rounding_of_the_crimped_state_does_not_grow(
+    end_in_sac: Deployment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A few units in the last place at the start, less than a micrometre at the end."""
+    rng = np.random.default_rng(0)
+
+    def shaken(*arguments: Any) -> State:
+        state = crimped_state(*arguments)
+        noise = 1.0 + 4e-16 * rng.integers(-4, 5, state.positions.shape)
+        return State(state.positions * noise, state.rotations)
+
+    monkeypatch.setattr("braidcast.deployment.simulate.crimped_state", shaken)
+    again = simulate(end_in_sac.case)
+    assert again.converged
+    apart = np.linalg.norm(again.positions - end_in_sac.positions, axis=1)
+    assert 0.0 < apart.max() < 1e-3
