@@ -18,7 +18,7 @@ from braidcast.mechanics import (
     follow_path,
 )
 from braidcast.mechanics.contact import SignedDistance, contact_law
-from braidcast.mechanics.equilibrium import Equilibrium, newton, remembered
+from braidcast.mechanics.equilibrium import Equilibrium, newton
 from braidcast.mechanics.rotations import Array, exp_so3
 from braidcast.mechanics.surfaces import Cylinder, Plane, Sphere
 from braidcast.mechanics.system import System
@@ -247,7 +247,7 @@ def creep(steps: int = 200, cycles: int = 20) -> tuple[float, float]:
     assert result.converged, result.reason
 
     def step(system: System, last: Equilibrium) -> Equilibrium:
-        after = newton(system, last.state, options, memories=remembered(last))
+        after = newton(system, last.state, options, memories=last.memories)
         assert after.converged, after.reason
         return after
 

@@ -13,7 +13,7 @@ import numpy as np
 from braidcast.deployment.net import wire_section
 from braidcast.devices import Braid
 from braidcast.mechanics import Contact, NewtonOptions, SignedDistance, State
-from braidcast.mechanics.equilibrium import Equilibrium, Progress, newton, remembered
+from braidcast.mechanics.equilibrium import Equilibrium, Progress, newton
 from braidcast.mechanics.relaxation import RelaxationOptions, relax
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import Springs, System
@@ -139,7 +139,7 @@ def _harden(
         )
         iterations += attempt.iterations
         if attempt.converged:
-            last, share = replace(attempt, memories=remembered(attempt)), target
+            last, share = attempt, target
             if share >= 1.0 and last.evaluation.contacts[0].penetration <= threshold:
                 return stiffer, last, iterations
         elif factor > 1.05:
@@ -166,7 +166,7 @@ def _balance(
             )
             iterations += eased.iterations
             if eased.converged:
-                last = replace(eased, memories=remembered(eased))
+                last = eased
         attempt = newton(system, last.state, options, axial=last.axial, memories=last.memories)
         iterations += attempt.iterations
         if attempt.converged:

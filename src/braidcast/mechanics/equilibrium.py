@@ -46,7 +46,8 @@ class NewtonOptions:
 class Equilibrium:
     """How a solution ended: ``reason`` says why, in words; ``residual`` in N.
 
-    ``residuals`` are those of all iterates, the first before any step.
+    ``residuals`` are those of all iterates, the first before any step. ``memories`` is what the
+    walls remember: of this state when it converged, else of the one it started from.
     """
 
     state: State
@@ -151,6 +152,8 @@ def newton(
         )
         state = moved(state, step)
         iterations += 1
+    if converged:
+        memories = tuple(contact.memory for contact in evaluation.contacts)
     return Equilibrium(
         state,
         converged,
@@ -171,11 +174,6 @@ def _shortening(step: Array, options: NewtonOptions) -> float:
     return min(
         1.0, options.largest_step / max(far, 1e-300), options.largest_turn / max(turn, 1e-300)
     )
-
-
-def remembered(equilibrium: Equilibrium) -> tuple[FrictionMemory, ...]:
-    """What the walls remember of a converged state."""
-    return tuple(contact.memory for contact in equilibrium.evaluation.contacts)
 
 
 def follow_path(
@@ -221,8 +219,8 @@ def follow_path(
         iterations += attempt.iterations
         if attempt.converged:
             state, reached, axial = attempt.state, target, attempt.axial
-            memories = remembered(attempt)
-            result = replace(attempt, iterations=iterations, memories=memories)
+            memories = attempt.memories
+            result = replace(attempt, iterations=iterations)
             if attempt.iterations <= 5:
                 size *= 1.5
             if progress is not None:

@@ -16,7 +16,6 @@ from braidcast.mechanics.equilibrium import (
     NewtonOptions,
     Progress,
     newton,
-    remembered,
 )
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import Springs, System
@@ -99,8 +98,8 @@ def relax(
             step *= max(0.3, 0.9 * options.largest_move / move) if attempt.converged else 1.0 / 3.0
             continue
         time, steps = time + step, steps + 1
-        state, axial, memories = attempt.state, attempt.axial, remembered(attempt)
-        last = replace(attempt, memories=memories)
+        state, axial, memories = attempt.state, attempt.axial, attempt.memories
+        last = attempt
         path.append(state.positions)
         if progress is not None:
             scale = options.first_step
