@@ -76,6 +76,9 @@ def bent_along_vessel(case: Case) -> Deployment:
         crossings=braid.crossings,
         wire_distance=-case.vessel_geometry.distance(positions) - braid.wire_radius,
         contact_force=np.linspace(0.0, 1e-3, len(positions)),
+        positioned_centreline=centreline.at_arc_length(
+            case.start_arc_length + np.linspace(0.0, case.crimped_length, braid.segments + 1)
+        ),
         outcome="success",
         clinical_outcome="success",
         converged=True,

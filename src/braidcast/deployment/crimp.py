@@ -78,15 +78,21 @@ def crimp(
     return follow_path(problem, steps=4, options=NewtonOptions(tolerance=1e-7), progress=progress)
 
 
-def crimped_state(braid: Braid, crimped_radius: float, progress: Progress | None = None) -> State:
+def crimped_state(
+    braid: Braid,
+    crimped_radius: float,
+    progress: Progress | None = None,
+    cache: Path | None = None,
+) -> State:
     """The crimped state, from the cache when this device was crimped before.
 
-    The cache is ``BRAIDCAST_CACHE`` or the user's cache folder; a file there is named by all that
-    it depends on, written whole or not at all, and computed anew when unreadable.
+    The ``cache`` is a folder, by default ``BRAIDCAST_CACHE`` or the user's cache folder; a file
+    there is named by all that it depends on, written whole or not at all, and computed anew when
+    unreadable.
 
     Raises CrimpingFailed if crimping does not converge.
     """
-    path = _cache_file(braid, crimped_radius)
+    path = (cache or _user_cache()) / _cache_name(braid, crimped_radius)
     try:
         with path.open("rb") as kept, np.load(kept, allow_pickle=False) as stored:
             return State(stored["positions"], stored["rotations"])
@@ -112,8 +118,11 @@ def crimped_state(braid: Braid, crimped_radius: float, progress: Progress | None
     return result.state
 
 
-def _cache_file(braid: Braid, crimped_radius: float) -> Path:
+def _user_cache() -> Path:
     folder = os.environ.get("BRAIDCAST_CACHE")
+    return Path(folder) if folder else user_cache_path("braidcast")
+
+
+def _cache_name(braid: Braid, crimped_radius: float) -> str:
     key = repr((VERSION, astuple(braid), float(crimped_radius)))
-    name = hashlib.sha256(key.encode()).hexdigest()[:24]
-    return (Path(folder) if folder else user_cache_path("braidcast")) / f"crimped_{name}.npz"
+    return f"crimped_{hashlib.sha256(key.encode()).hexdigest()[:24]}.npz"

@@ -39,6 +39,8 @@ class Deployment:
     depth of the node inside the lumen, less the wire's radius."""
     contact_force: Array
     """Size of the force the wall puts on each node, (N,) N."""
+    positioned_centreline: Array
+    """Ring centres of the crimped stent laid along the vessel, (rings, 3) mm: the paper's C_T."""
     outcome: str
     clinical_outcome: str
     converged: bool

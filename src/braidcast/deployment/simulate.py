@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -33,16 +34,20 @@ def simulate(
     progress: StageProgress | None = None,
     keep_frames: bool = False,
     linear_solver: str = "block_tridiagonal",
+    cache: Path | None = None,
 ) -> Deployment:
     """Finite element deployment of a case (paper, section 2.1.3).
 
     A simulation that finds no equilibrium returns its last state with ``converged`` False and the
-    reason. ``keep_frames`` keeps the crimped, positioned and all intermediate released shapes.
+    reason. ``keep_frames`` keeps the crimped, positioned and all intermediate released shapes;
+    ``cache`` is the folder that keeps crimped devices, by default the user's.
 
     One BLAS thread is used: the blocks are small, and the answer is the same on any machine size.
     """
     with threadpool_limits(1, "blas"):
-        return _simulate(case, options or ReleaseOptions(), progress, keep_frames, linear_solver)
+        return _simulate(
+            case, options or ReleaseOptions(), progress, keep_frames, linear_solver, cache
+        )
 
 
 def _simulate(
@@ -51,6 +56,7 @@ def _simulate(
     progress: StageProgress | None,
     keep_frames: bool,
     linear_solver: str,
+    cache: Path | None,
 ) -> Deployment:
     wall_clock, cpu_clock = time.perf_counter(), time.process_time()
     braid = case.braid
@@ -62,7 +68,9 @@ def _simulate(
     )
     system = System(problem, linear_solver)
     frames = [("free", np.array(braid.positions))]
-    system, last, iterations = _stages(case, system, options, progress or _no_progress, frames)
+    system, last, iterations = _stages(
+        case, system, options, progress or _no_progress, cache, frames
+    )
     reached = dict(frames)
     under_way = next((stage for stage in STAGES if stage not in reached), STAGES[-1])
     frames.append((under_way, last.state.positions))
@@ -72,7 +80,7 @@ def _simulate(
         last,
         iterations,
         frames if keep_frames else [],
-        _length(reached.get("crimp", last.state.positions), np.array(braid.rings)),
+        reached.get("crimp", last.state.positions),
         (time.perf_counter() - wall_clock, time.process_time() - cpu_clock),
     )
 
@@ -86,6 +94,7 @@ def _stages(
     system: System,
     options: ReleaseOptions,
     report: StageProgress,
+    cache: Path | None,
     frames: list[tuple[str, Array]],
 ) -> tuple[System, Equilibrium, int]:
     """Crimp, position, release; adds to ``frames``.
@@ -94,15 +103,12 @@ def _stages(
     """
     braid = case.braid
     try:
-        crimped = crimped_state(braid, case.crimped_radius, partial(report, "crimp"))
+        crimped = crimped_state(braid, case.crimped_radius, partial(report, "crimp"), cache)
     except CrimpingFailed as failure:
         return system, failure.equilibrium, failure.equilibrium.iterations
     report("crimp", 1.0)
     frames.append(("crimp", crimped.positions))
-    rings = np.array(braid.rings)
-    heights = np.bincount(rings, weights=crimped.positions[:, 2]) / np.bincount(rings)
-    arc_lengths = case.start_arc_length + heights - heights[0]
-    path = RingPath.along(case.centreline.at_arc_length(arc_lengths))
+    path = RingPath.along(_target_centreline(case, crimped.positions))
     positioned, iterations = _position(system, crimped, path, braid, partial(report, "position"))
     if not positioned.converged:
         return system, positioned, iterations
@@ -119,6 +125,13 @@ def _stages(
     report("release", 1.0)
     frames += [("release", positions) for positions in released.path]
     return released.system, released.equilibrium, iterations + released.iterations
+
+
+def _target_centreline(case: Case, crimped: Array) -> Array:
+    """The paper's C_T: where the ring centres of the crimped braid go, (rings, 3) mm."""
+    heights = _ring_centres(crimped, np.array(case.braid.rings))[:, 2]
+    arc_lengths = case.start_arc_length + heights - heights[0]
+    return case.centreline.at_arc_length(arc_lengths)
 
 
 def _position(
@@ -141,10 +154,11 @@ def _deployment(
     last: Equilibrium,
     iterations: int,
     frames: list[tuple[str, Array]],
-    crimped_length: float,
+    crimped: Array,
     seconds: tuple[float, float],
 ) -> Deployment:
     braid, state = case.braid, last.state
+    rings = np.array(braid.rings)
     # positioning knows no wall, and leaves none of its memories
     evaluation = system.evaluate(state, memories=last.memories or None, tangent=False)
     contacts = evaluation.contacts[0]
@@ -168,8 +182,9 @@ def _deployment(
         residual_relative=last.residual / total if total > 0.0 else float("nan"),
         strain_energy_mJ=evaluation.strain_energy,
         max_penetration_mm=contacts.penetration,
-        crimped_length_mm=crimped_length,
-        deployed_length_mm=_length(state.positions, np.array(braid.rings)),
+        positioned_centreline=_target_centreline(case, crimped),
+        crimped_length_mm=_length(crimped, rings),
+        deployed_length_mm=_length(state.positions, rings),
         free_length_mm=braid.length,
         end_nodes_in_sac=labels.end_nodes_in_sac,
         wall_seconds=seconds[0],
@@ -178,8 +193,13 @@ def _deployment(
     )
 
 
+def _ring_centres(positions: Array, rings: IntArray) -> Array:
+    count = np.bincount(rings)
+    sums = [np.bincount(rings, weights=coordinate) for coordinate in positions.T]
+    return np.stack(sums, axis=1) / count[:, None]
+
+
 def _length(positions: Array, rings: IntArray) -> float:
     """Length of the line through the ring centres, mm."""
-    count = np.bincount(rings)
-    centres = [np.bincount(rings, weights=positions[:, i]) / count for i in range(3)]
-    return float(np.linalg.norm(np.diff(centres, axis=1), axis=0).sum())
+    segments = np.diff(_ring_centres(positions, rings), axis=0)
+    return float(np.linalg.norm(segments, axis=1).sum())
