@@ -56,7 +56,9 @@ def test_the_strongly_curved_example_is_bent_beyond_the_study() -> None:
     assert case.aneurysm is not None
 
 
-@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted(set(EXAMPLES.glob("*.toml")) - {EXAMPLES / "plan.toml"}), ids=lambda p: p.stem
+)
 def test_examples_have_titles_and_survive_rewriting(path: Path) -> None:
     case = Case.from_toml(path)
     assert case.title

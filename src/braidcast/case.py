@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
@@ -18,6 +17,7 @@ from braidcast.case_errors import one_sentence
 from braidcast.case_toml import toml_text
 from braidcast.devices import Braid, catalogue
 from braidcast.errors import InputError
+from braidcast.toml_file import parse, read_text
 from braidcast.vessels import QuadraticBezier, SaccularVessel, Sphere, Tube
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -31,21 +31,18 @@ Point = Annotated[
     Field(strict=False),
 ]
 
-#: A case file is a page of text; whatever is larger was not meant for us.
-_LARGEST_FILE = 1_000_000
-
 
 def _point(default: Any = ...) -> Any:
     return Field(default=default, description="three numbers of mm, each from -1000 to 1000")
 
 
-class _Table(BaseModel):
-    """A table of the case file: every key known, every value of its own type, nothing changed."""
+class Table(BaseModel):
+    """A table of a user's file: every key known, every value of its own type, nothing changed."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class Vessel(_Table):
+class Vessel(Table):
     """Parent vessel: a round tube about the quadratic Bézier curve P0, P1, P2, all in mm."""
 
     P0: Point = _point((0.0, 0.0, 0.0))
@@ -54,7 +51,7 @@ class Vessel(_Table):
     diameter: Number = Field(gt=0.0, le=50.0, description="a number of mm above 0, at most 50")
 
 
-class Aneurysm(_Table):
+class Aneurysm(Table):
     """Spherical sac of ``diameter`` mm, placed by exactly one of ``protrusion`` and ``centre``.
 
     ``protrusion`` f puts the centre at R_v + f R_a above (+y) the middle of the centreline by arc
@@ -81,7 +78,7 @@ class Aneurysm(_Table):
         return self
 
 
-class Device(_Table):
+class Device(Table):
     """A braid of the catalogue, by ``name``; every other key given replaces that braid's value.
 
     Lengths in mm, ``young_modulus`` in MPa.
@@ -130,7 +127,7 @@ class Device(_Table):
         return self
 
 
-class Site(_Table):
+class Site(Table):
     """Where the device is released.
 
     ``eta`` puts ring 0 of the crimped stent at the arc length η (L_centreline − L_crimped −
@@ -144,13 +141,13 @@ class Site(_Table):
     )
 
 
-class Wall(_Table):
+class Wall(Table):
     """Contact of wires and wall: Coulomb's coefficient of friction, 0 allowed."""
 
     friction: Number = Field(default=0.1, ge=0.0, le=2.0, description="a number from 0 to 2")
 
 
-class Case(_Table):
+class Case(Table):
     """Everything a deployment depends on. Build it with ``from_toml`` or ``from_dict``."""
 
     title: str = Field(default="", max_length=200, description="a text of at most 200 characters")
@@ -171,14 +168,8 @@ class Case(_Table):
     def from_toml(cls, path: str | Path) -> Self:
         """Read the case file at ``path``; ``InputError`` names the file and what is wrong in it."""
         try:
-            text = _read_text(Path(path))
-            try:
-                data = tomllib.loads(text)
-            except RecursionError:
-                raise InputError("is not a case file: its values are nested too deeply") from None
-            except ValueError as error:
-                raise InputError(f"is not valid TOML: {error}") from None
-            return cls.from_dict(data)
+            text = read_text(Path(path), "case file", "the tables [vessel] and [site]")
+            return cls.from_dict(parse(text, "case file"))
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
 
@@ -256,25 +247,3 @@ class Case(_Table):
         """Arc length from P0 at which ring 0 of the crimped device is put, mm."""
         spare = self.centreline.length - self.crimped_length - feasibility.MARGIN
         return self.site.eta * spare
-
-
-def _read_text(path: Path) -> str:
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(_LARGEST_FILE + 1)
-    except FileNotFoundError:
-        raise InputError("there is no such case file") from None
-    except IsADirectoryError:
-        raise InputError("is a folder, must be a case file") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"cannot be read: {reason}") from None
-    if len(content) > _LARGEST_FILE:
-        raise InputError(f"is longer than {_LARGEST_FILE} bytes, must be a short text in TOML")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError("is not text in UTF-8, must be a case file in TOML") from None
-    if not text.strip():
-        raise InputError("is empty, must have the tables [vessel] and [site]")
-    return text

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date, time
 from difflib import get_close_matches
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from braidcast.errors import InputError
 
 _LONGEST_VALUE = 60
 
 
-def one_sentence(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> str:
+def one_sentence(
+    error: ValidationError, model: type[BaseModel], data: Mapping[str, Any], whole: str = "a case"
+) -> str:
     """Name the field as in the TOML, its value, and what is allowed, for the first mistake.
 
-    ``model`` is the model of the whole case and ``data`` what it was given. An unknown key goes
+    ``model`` is the model of the ``whole`` file and ``data`` what it was given. An unknown key goes
     first: a misspelt key is also missed where it should be, and the misspelling is what to mend.
     """
     mistakes = error.errors(include_url=False)
@@ -28,15 +31,15 @@ def one_sentence(error: ValidationError, model: type[BaseModel], data: Mapping[s
     keys = [str(key) for key in mistake["loc"] if isinstance(key, str)]
     name = ".".join(keys)
     if mistake["type"] == "extra_forbidden":
-        return f"{name} is not a known key; {_suggestion(keys, model)}"
+        return f"{name} is not a known key; {_suggestion(keys, model, whole)}"
     rule = _rule(keys, model)
     value = _value(keys, data)
     if value is _missing:
         return f"{name} is missing, must be {rule}"
-    return f"{name} = {_shown(value)} must be {rule}"
+    return f"{name} = {shown(value)} must be {rule}"
 
 
-def _suggestion(keys: list[str], model: type[BaseModel]) -> str:
+def _suggestion(keys: list[str], model: type[BaseModel], whole: str) -> str:
     """The known key that was probably meant, or the keys that are allowed there."""
     *table, key = keys
     known = {".".join(path): path for path in _paths(model)}
@@ -50,7 +53,7 @@ def _suggestion(keys: list[str], model: type[BaseModel]) -> str:
     near = get_close_matches(".".join(keys), known, n=1, cutoff=0.8)
     if near:
         return f"did you mean {near[0]}?"
-    where = f"[{'.'.join(table)}]" if table else "a case"
+    where = f"[{'.'.join(table)}]" if table else whole
     return f"{where} takes {', '.join(here.model_fields)}"
 
 
@@ -77,9 +80,20 @@ def _model_at(keys: list[str], model: type[BaseModel]) -> type[BaseModel]:
     return model
 
 
+def field_at(keys: Sequence[str], model: type[BaseModel]) -> FieldInfo | None:
+    """The field of ``model`` at ``keys``, or None if there is no such field."""
+    for key in keys[:-1]:
+        table = _table(model, key) if key in model.model_fields else None
+        if table is None:
+            return None
+        model = table
+    return model.model_fields.get(keys[-1])
+
+
 def _rule(keys: list[str], model: type[BaseModel]) -> str:
     """What the field at ``keys`` may be; its description in the model."""
-    return _model_at(keys[:-1], model).model_fields[keys[-1]].description or "valid"
+    field = field_at(keys, model)
+    return field.description or "valid" if field else "valid"
 
 
 _missing = object()
@@ -93,7 +107,8 @@ def _value(keys: list[str], data: Any) -> Any:
     return data
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """The value as the file has it, cut if it is long."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, (date, time)):

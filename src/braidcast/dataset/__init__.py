@@ -1,0 +1,1 @@
+"""Many cases: planned, drawn, run, and kept where nothing is lost."""
