@@ -31,3 +31,12 @@ def draw(plan: Plan, progress: DrawProgress | None = None) -> Drawn:
         return Drawn(np.empty((plan.cases, 0)), 0)
     points = qmc.LatinHypercube(len(low), rng=plan.seed).random(plan.cases)
     return Drawn(low + points * (high - low), 0)
+
+
+def discrepancies(plan: Plan, values: NDArray[np.float64]) -> dict[int, float]:
+    """Centred discrepancy (scipy's "CD") of each subset and of all cases, by their size."""
+    low = np.array([parameter.low for parameter in plan.ranges])
+    high = np.array([parameter.high for parameter in plan.ranges])
+    points = (values - low) / (high - low)
+    sizes = (*plan.subsets, plan.cases) if plan.ranges else ()
+    return {size: float(qmc.discrepancy(points[:size], method="CD")) for size in sizes}

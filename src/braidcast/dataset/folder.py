@@ -10,10 +10,10 @@ import json
 from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from filelock import FileLock, Timeout
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from braidcast import __version__
 from braidcast.case import Case
 from braidcast.dataset.atomic import TEMPORARY, write_atomically
-from braidcast.dataset.draw import DrawProgress, draw
+from braidcast.dataset.draw import DrawProgress, discrepancies, draw
 from braidcast.dataset.plan import Plan
 from braidcast.errors import InputError
 
@@ -44,6 +44,8 @@ class DatasetFolder:
     """Names the plan and its cases: 16 hexadecimal digits, the same in every copy."""
     replaced: int
     """How many samples were infeasible and gave way to others."""
+    is_new: bool = False
+    """Whether ``create`` has just made it, rather than found it."""
 
     @classmethod
     def create(
@@ -80,7 +82,7 @@ class DatasetFolder:
             _check_same(path / name, content)
         for name, content in files.items():
             write_atomically(path / name, content)
-        return cls.open(path)
+        return replace(cls.open(path), is_new=True)
 
     @classmethod
     def open(cls, path: str | Path) -> DatasetFolder:
@@ -121,6 +123,11 @@ class DatasetFolder:
         """Size of the smallest subset that case ``index`` is in."""
         sizes = (*self.plan.subsets, self.plan.cases)
         return sizes[bisect_right(sizes, self._checked(index))]
+
+    @property
+    def discrepancies(self) -> dict[int, float]:
+        """Centred discrepancy of each subset and of all cases, by their size."""
+        return discrepancies(self.plan, self.values)
 
     @property
     def cases_folder(self) -> Path:

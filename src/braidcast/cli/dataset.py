@@ -1,0 +1,74 @@
+"""braidcast dataset: many cases, planned, run and kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from braidcast.cli.messages import told
+from braidcast.cli.progress import bars
+
+if TYPE_CHECKING:
+    from braidcast.dataset.folder import DatasetFolder
+
+app = typer.Typer(
+    help="Many cases: plan them, run them anywhere, keep them.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+
+@app.command(epilog="Example:  braidcast dataset create examples/plan.toml -o study")
+def create(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="The plan file.")],
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Folder for the dataset, made if missing in a folder that exists. "
+            "Default: the plan file's name without .toml, in the current folder.",
+        ),
+    ] = None,
+) -> None:
+    """Draw the cases of a plan.
+
+    A plan is a case file under [case] in which numbers may be ranges { min = .., max = .. },
+    with cases, seed, subsets and tests above it. Every case is checked to be feasible.
+
+    Writes plan.toml, cases.csv and dataset.json. A folder that holds this plan already is kept.
+
+    Exit codes: 0 done; 1 the folder could not be written; 2 bad input; 130 interrupted.
+    """
+    with told():
+        from braidcast.dataset.folder import DatasetFolder
+        from braidcast.dataset.plan import Plan
+
+        given = Plan.from_toml(plan)
+        with bars("draw", delay=2.0) as progress:
+            folder = DatasetFolder.create(given, plan.stem if output is None else output, progress)
+        typer.echo(_plan_report(folder))
+
+
+def _plan_report(folder: DatasetFolder) -> str:
+    plan = folder.plan
+    kept = "" if folder.is_new else ", which held this plan already and is kept as it was"
+    rows = [
+        ("plan", plan.title or "(no title)"),
+        ("cases", f"{plan.cases}"),
+        ("subsets", " in ".join(str(size) for size in (*plan.subsets, plan.cases))),
+        ("tests", f"the first {plan.tests}, in no training set" if plan.tests else "none"),
+        ("seed", f"{plan.seed}"),
+        *(
+            ("" if row else "parameters", f"{p.name:<24}{p.low:g} to {p.high:g} {p.unit}".rstrip())
+            for row, p in enumerate(plan.ranges)
+        ),
+        ("replaced", f"{folder.replaced} infeasible samples"),
+        ("discrepancy", ", ".join(f"{n}: {cd:.3g}" for n, cd in folder.discrepancies.items())),
+        ("folder", f"{folder.path}{kept}"),
+        ("next", f"braidcast dataset run {folder.path}"),
+    ]
+    return "\n".join(f"{name:<16}{value}" for name, value in rows)
