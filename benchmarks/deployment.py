@@ -183,7 +183,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--cases", type=int, default=12, help="only the first so many")
     parser.add_argument("--variants", choices=["default", "all"], default="all")
     parser.add_argument("--jobs", type=int, choices=[1, 2], default=1, help="processes at once")
-    parser.add_argument("--linear-solver", default="block_tridiagonal")
+    parser.add_argument("--linear-solver", default="band_cholesky")
     return parser.parse_args()
 
 

@@ -21,7 +21,7 @@ from problems.row import Row
 
 WIRE = Section.circular(0.014, 225000.0, 0.33)
 
-SOLVERS = ["block_tridiagonal", "superlu"] + (["pardiso"] if find_spec("pypardiso") else [])
+SOLVERS = ["band_cholesky", "superlu"] + (["pardiso"] if find_spec("pypardiso") else [])
 """The linear solvers installed here."""
 
 
@@ -85,7 +85,7 @@ def bent_braid(method: Literal["shared", "penalty"], wires: int = 12) -> Problem
     )
 
 
-def solved(problem: Problem, linear_solver: str = "block_tridiagonal") -> Equilibrium:
+def solved(problem: Problem, linear_solver: str = "band_cholesky") -> Equilibrium:
     options = NewtonOptions(tolerance=1e-9)
     result = follow_path(problem, steps=4, options=options, linear_solver=linear_solver)
     assert result.converged, result.reason

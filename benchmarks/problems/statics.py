@@ -15,7 +15,7 @@ from braidcast.mechanics import (
     Supports,
     follow_path,
 )
-from braidcast.mechanics.block_tridiagonal import NotPositiveDefinite
+from braidcast.mechanics.band_cholesky import NotPositiveDefinite
 from braidcast.mechanics.system import System
 from problems.row import Row, relative
 

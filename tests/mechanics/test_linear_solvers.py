@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from braidcast.errors import InputError
-from braidcast.mechanics.block_tridiagonal import NotPositiveDefinite
+from braidcast.mechanics.band_cholesky import NotPositiveDefinite
 from braidcast.mechanics.linear_solvers import breadth_first_levels, solver
 from problems.nets import SOLVERS
 
@@ -109,12 +109,12 @@ def test_not_finite_is_not_positive_definite():
     dense, levels = random_matrix(2)
     indptr, indices, data = pattern(dense)
     with pytest.raises(NotPositiveDefinite):
-        solver("block_tridiagonal", indptr, indices, levels)(np.nan * data)
+        solver("band_cholesky", indptr, indices, levels)(np.nan * data)
 
 
 def test_unknown_and_missing_solvers_are_named():
     empty = np.zeros(0, dtype=np.int64)
-    with pytest.raises(InputError, match='"cg" is unknown; use "block_tridiagonal"'):
+    with pytest.raises(InputError, match='"cg" is unknown; use "band_cholesky"'):
         solver("cg", np.zeros(1, dtype=np.int64), empty, empty)
     if "pardiso" not in SOLVERS:
         with pytest.raises(InputError, match="pip install"):

@@ -33,7 +33,7 @@ def simulate(
     options: ReleaseOptions | None = None,
     progress: StageProgress | None = None,
     keep_frames: bool = False,
-    linear_solver: str = "block_tridiagonal",
+    linear_solver: str = "band_cholesky",
     cache: Path | None = None,
 ) -> Deployment:
     """Finite element deployment of a case (paper, section 2.1.3).

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from braidcast.mechanics.band_cholesky import NotPositiveDefinite
 from braidcast.mechanics.beams import State
-from braidcast.mechanics.block_tridiagonal import NotPositiveDefinite
 from braidcast.mechanics.corotational import axial_forces
 from braidcast.mechanics.friction import FrictionMemory
 from braidcast.mechanics.linear_solvers import Solve
@@ -183,7 +183,7 @@ def follow_path(
     steps: int = 10,
     smallest_step: float = 1e-4,
     options: NewtonOptions | None = None,
-    linear_solver: str = "block_tridiagonal",
+    linear_solver: str = "band_cholesky",
     progress: Progress | None = None,
     path: tuple[float, float] = (0.0, 1.0),
     memories: tuple[FrictionMemory, ...] | None = None,

@@ -1,6 +1,6 @@
 """One door to sparse symmetric solvers, opened by key.
 
-    factorise = solver("block_tridiagonal", indptr, indices, levels)
+    factorise = solver("band_cholesky", indptr, indices, levels)
     solve = factorise(data)          # raises NotPositiveDefinite
     x = solve(b)
 
@@ -18,7 +18,7 @@ from scipy.sparse.linalg import splu
 
 from braidcast.errors import InputError
 from braidcast.mechanics.arrays import IntArray
-from braidcast.mechanics.block_tridiagonal import BlockTridiagonal, NotPositiveDefinite
+from braidcast.mechanics.band_cholesky import BandCholesky, NotPositiveDefinite
 from braidcast.mechanics.rotations import Array
 
 ZERO_PIVOT = -4
@@ -31,25 +31,25 @@ Factorise = Callable[[Array], Solve]
 def solver(key: str, indptr: IntArray, indices: IntArray, levels: IntArray) -> Factorise:
     """The factorisation of matrices with one pattern.
 
-    ``key``: "block_tridiagonal" (Cholesky, levels as blocks, no extra dependency), "pardiso" (MKL's
+    ``key``: "band_cholesky" (no extra dependency), "pardiso" (MKL's
     Cholesky, extra ``braidcast[pardiso]``) or "superlu" (SciPy's LU, last resort). ``levels`` (n,)
     numbers the unknowns so that only those of the same or neighbouring levels are coupled.
 
     Raises InputError for an unknown key or one that is not installed.
     """
-    if key == "block_tridiagonal":
-        return BlockTridiagonal(indptr, indices, levels).factorise
+    if key == "band_cholesky":
+        return BandCholesky(indptr, indices, levels).factorise
     if key == "superlu":
         return _superlu(indptr, indices)
     if key == "pardiso":
         if find_spec("pypardiso") is None:
             raise InputError(
                 'linear solver "pardiso" is not installed; pip install "braidcast[pardiso]", '
-                'or use "block_tridiagonal" or "superlu"'
+                'or use "band_cholesky" or "superlu"'
             )
         return _pardiso(indptr, indices)
     raise InputError(
-        f'linear solver "{key}" is unknown; use "block_tridiagonal", "pardiso" or "superlu"'
+        f'linear solver "{key}" is unknown; use "band_cholesky", "pardiso" or "superlu"'
     )
 
 

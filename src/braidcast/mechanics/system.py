@@ -45,7 +45,7 @@ class Evaluation:
 class System:
     """A problem with its unknowns numbered and its sparse pattern analysed."""
 
-    def __init__(self, problem: Problem, linear_solver: str = "block_tridiagonal") -> None:
+    def __init__(self, problem: Problem, linear_solver: str = "band_cholesky") -> None:
         self.problem = problem
         net = problem.net
         count = len(net.nodes)
