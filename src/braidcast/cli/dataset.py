@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from braidcast.cli.dataset_run import run, status
 from braidcast.cli.messages import told
 from braidcast.cli.progress import bars
 
@@ -72,3 +73,7 @@ def _plan_report(folder: DatasetFolder) -> str:
         ("next", f"braidcast dataset run {folder.path}"),
     ]
     return "\n".join(f"{name:<16}{value}" for name, value in rows)
+
+
+app.command(epilog="Example:  braidcast dataset run study --workers 4")(run)
+app.command(epilog="Example:  braidcast dataset status study")(status)

@@ -144,8 +144,8 @@ def write_case(path: Path, record: CaseRecord, origin: Origin) -> None:
     write_atomically(path, _sealed(_netcdf(record, origin)))
 
 
-def read_case(path: Path) -> CaseRecord:
-    """Read a case file and check its seal.
+def read_case(path: Path, *, arrays: bool = True) -> CaseRecord:
+    """Read a case file and check its seal; without ``arrays`` keep only what is small.
 
     Raises ``FileNotFoundError`` if there is none, ``DamagedFile`` if it is not what was written,
     ``InputError`` if it was written by a newer braidcast.
@@ -156,14 +156,14 @@ def read_case(path: Path) -> CaseRecord:
         if _seal(content, place) != content[place]:
             raise ValueError("its content does not match its seal")
         header = read_header(content)
-        texts = header.texts
+        texts, places = header.texts, header.variables
         if int(texts["store_version"]) > STORE_VERSION:
             raise InputError(
                 f"{path}: store_version = {texts['store_version']} must be at most "
                 f"{STORE_VERSION}; it was written by a newer braidcast, {texts['versions']}"
             )
-        known = {f.name for f in (*RESULTS, *COSTS, CENTRE)}
-        places = {name: p for name, p in header.variables.items() if name in known}
+        kept = (*RESULTS, *COSTS, CENTRE) if arrays else (*NUMBERS, *COSTS, CENTRE)
+        values = {f.name: places[f.name].values(content) for f in kept if f.name in places}
         return CaseRecord(
             plan_id=texts["plan_id"],
             index=int(texts["case"]),
@@ -171,7 +171,8 @@ def read_case(path: Path) -> CaseRecord:
             reason=texts["reason"],
             outcome=texts.get("outcome", ""),
             clinical_outcome=texts.get("clinical_outcome", ""),
-            values={name: place.values(content) for name, place in places.items()},
+            # copies, because a view would keep the whole content in memory
+            values=values if arrays else {name: v.copy() for name, v in values.items()},
             toml=texts["case_toml"],
             versions=texts["versions"],
             checksum=texts.get("checksum", ""),
