@@ -57,18 +57,17 @@ def create(
 def _plan_report(folder: DatasetFolder) -> str:
     plan = folder.plan
     kept = "" if folder.is_new else ", which held this plan already and is kept as it was"
+    parameters = [f"{p.name:<24}{p.low:g} to {p.high:g} {p.unit}".rstrip() for p in plan.ranges]
+    discrepancies = [f"{size}: {value:.3g}" for size, value in folder.discrepancies.items()]
     rows = [
         ("plan", plan.title or "(no title)"),
         ("cases", f"{plan.cases}"),
-        ("subsets", " in ".join(str(size) for size in (*plan.subsets, plan.cases))),
+        ("subsets", " in ".join(map(str, (*plan.subsets, plan.cases))) if plan.subsets else "none"),
         ("tests", f"the first {plan.tests}, in no training set" if plan.tests else "none"),
         ("seed", f"{plan.seed}"),
-        *(
-            ("" if row else "parameters", f"{p.name:<24}{p.low:g} to {p.high:g} {p.unit}".rstrip())
-            for row, p in enumerate(plan.ranges)
-        ),
-        ("replaced", f"{folder.replaced} infeasible samples"),
-        ("discrepancy", ", ".join(f"{n}: {cd:.3g}" for n, cd in folder.discrepancies.items())),
+        ("parameters", f"\n{'':16}".join(parameters) or "none: one case"),
+        ("replaced", f"{folder.replaced} samples that were infeasible"),
+        ("discrepancy", ", ".join(discrepancies) or "not computed"),
         ("folder", f"{folder.path}{kept}"),
         ("next", f"braidcast dataset run {folder.path}"),
     ]
