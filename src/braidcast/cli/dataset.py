@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -69,7 +70,7 @@ def _plan_report(folder: DatasetFolder) -> str:
         ("replaced", f"{folder.replaced} samples that were infeasible"),
         ("discrepancy", ", ".join(discrepancies) or "not computed"),
         ("folder", f"{folder.path}{kept}"),
-        ("next", f"braidcast dataset run {folder.path}"),
+        ("next", f"braidcast dataset run {quote(str(folder.path))}"),
     ]
     return "\n".join(f"{name:<16}{value}" for name, value in rows)
 

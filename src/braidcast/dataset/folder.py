@@ -24,6 +24,7 @@ from braidcast.case import Case
 from braidcast.dataset.atomic import TEMPORARY, write_atomically
 from braidcast.dataset.draw import DrawProgress, discrepancies, draw
 from braidcast.dataset.plan import Plan
+from braidcast.deployment.output import check_folder
 from braidcast.errors import InputError
 
 #: What a dataset folder looks like; a folder of a higher number is not for this braidcast.
@@ -56,17 +57,15 @@ class DatasetFolder:
         A folder that already holds this plan is opened as it is. ``InputError``, and nothing
         changed, if it holds anything else, cannot be written, or the plan has no feasible cases.
         """
-        if path == "":
-            raise InputError('dataset folder = "" must be the name of a folder, "." for this one')
-        path = Path(path)
-        if (path / _STAMP).is_file():
+        if path != "" and (Path(path) / _STAMP).is_file():
             folder = cls.open(path)
             if folder.plan.text != plan.text:
                 raise InputError(
-                    f"dataset folder = {path} holds another plan, must be empty or a new name"
+                    f"output folder = {path} holds another plan, must be empty or a new name"
                 )
             return folder
         _check_free(path)
+        path = Path(path)
         drawn = draw(plan, progress)
         text, table = plan.text.encode(), _table(plan, drawn.values)
         stamp = {
@@ -77,9 +76,9 @@ class DatasetFolder:
             "replaced": drawn.replaced,
         }
         files = {_PLAN: text, _CASES: table, _STAMP: (json.dumps(stamp, indent=2) + "\n").encode()}
-        path.mkdir(exist_ok=True)
         for name, content in files.items():
             _check_same(path / name, content)
+        path.mkdir(exist_ok=True)
         for name, content in files.items():
             write_atomically(path / name, content)
         return replace(cls.open(path), is_new=True)
@@ -100,9 +99,9 @@ class DatasetFolder:
                     f"{path / name} was changed after its cases were drawn, must be as "
                     "`braidcast dataset create` wrote it; create a new dataset for a new plan"
                 )
-        plan = Plan.from_text(plan_text.decode(), str(path / _PLAN))
+        plan = Plan.from_toml(path / _PLAN)
         plan_id = sha256(plan_text + table).hexdigest()[:16]
-        return cls(path, plan, _values(path, plan, table), plan_id, int(stamp.get("replaced", 0)))
+        return cls(path, plan, _values(path, plan, table), plan_id, stamp["replaced"])
 
     def __len__(self) -> int:
         return self.plan.cases
@@ -190,18 +189,18 @@ def _stamp(path: Path) -> dict[str, Any]:
         )
     try:
         stamp = json.loads(_read(path / _STAMP))
-        version = stamp["store_version"]
-        if version > STORE_VERSION:
-            raise InputError(
-                f"{path / _STAMP}: store_version = {version} must be at most {STORE_VERSION}: "
-                "the dataset was written by a newer braidcast"
-            )
-    except InputError:
-        raise
-    except (ValueError, KeyError, TypeError):
+        version, replaced = stamp["store_version"], stamp.get("replaced")
+    except (ValueError, KeyError, TypeError, RecursionError):
+        version = replaced = None
+    if isinstance(version, int) and version > STORE_VERSION:
+        raise InputError(
+            f"{path / _STAMP}: store_version = {version} must be at most {STORE_VERSION}: "
+            "the dataset was written by a newer braidcast"
+        )
+    if version != STORE_VERSION or not isinstance(replaced, int):
         raise InputError(
             f"{path / _STAMP} is damaged, must be as `braidcast dataset create` wrote it"
-        ) from None
+        )
     return stamp
 
 
@@ -212,30 +211,15 @@ def _read(path: Path) -> bytes:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
 
 
-def _check_free(path: Path) -> None:
+def _check_free(path: str | Path) -> None:
     """Raise ``InputError`` if the dataset could not be put at ``path``."""
-    try:
-        if path.exists() and not path.is_dir():
-            raise InputError(f"dataset folder = {path} is a file, must be a folder or a new name")
-        if not path.exists():
-            if not path.parent.is_dir():
-                raise InputError(
-                    f"dataset folder = {path} must be in a folder that exists, "
-                    f"{path.parent} does not"
-                )
-            return
-        for inside in sorted(path.iterdir()):
-            if inside.name.startswith(TEMPORARY):
-                continue
-            if inside.name not in (_PLAN, _CASES):
-                raise InputError(
-                    f"dataset folder = {path} holds {inside.name}, must be empty or a new name"
-                )
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"dataset folder = {path} cannot be used: {reason}") from None
+    check_folder(path)
+    # A creation that was cut short leaves nothing but these.
+    ours = (_PLAN, _CASES)
+    inside = sorted(p.name for p in Path(path).iterdir()) if Path(path).exists() else []
+    foreign = [n for n in inside if n not in ours and not n.startswith(TEMPORARY)]
+    if foreign:
+        raise InputError(f"output folder = {path} holds {foreign[0]}, must be empty or a new name")
 
 
 def _check_same(path: Path, content: bytes) -> None:
