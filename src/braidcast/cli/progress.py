@@ -31,6 +31,11 @@ class Bars:
         if time.monotonic() >= self._show_at:
             self.display.start()
 
+    def close(self) -> None:
+        """Take the bars down, if they are up."""
+        if self.display.live.is_started:
+            self.display.stop()
+
 
 @contextmanager
 def bars(first: str, delay: float = 0.0) -> Iterator[Bars]:
@@ -40,4 +45,4 @@ def bars(first: str, delay: float = 0.0) -> Iterator[Bars]:
         shown(first, 0.0)
         yield shown
     finally:
-        shown.display.stop()
+        shown.close()
