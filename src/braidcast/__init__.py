@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from braidcast.case import Case
+    from braidcast.dataset.store import open_dataset
     from braidcast.deployment.output import write_deployment
     from braidcast.deployment.result import Deployment
     from braidcast.deployment.simulate import simulate
@@ -19,12 +20,21 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-__all__ = ["Case", "Deployment", "InputError", "__version__", "simulate", "write_deployment"]
+__all__ = [
+    "Case",
+    "Deployment",
+    "InputError",
+    "__version__",
+    "open_dataset",
+    "simulate",
+    "write_deployment",
+]
 
 _homes = {
     "Case": "braidcast.case",
     "Deployment": "braidcast.deployment.result",
     "InputError": "braidcast.errors",
+    "open_dataset": "braidcast.dataset.store",
     "simulate": "braidcast.deployment.simulate",
     "write_deployment": "braidcast.deployment.output",
 }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from braidcast.cli.dataset_files import collect, export, merge
 from braidcast.cli.dataset_run import run, status
 from braidcast.cli.messages import told
 from braidcast.cli.progress import bars
@@ -77,3 +78,6 @@ def _plan_report(folder: DatasetFolder) -> str:
 
 app.command(epilog="Example:  braidcast dataset run study --workers 4")(run)
 app.command(epilog="Example:  braidcast dataset status study")(status)
+app.command(epilog="Example:  braidcast dataset collect study -o study.nc")(collect)
+app.command(epilog="Example:  braidcast dataset export study -o tables")(export)
+app.command(epilog="Example:  braidcast dataset merge here there -o both")(merge)

@@ -68,7 +68,7 @@ def run(
         except RunStopped as stopped:
             say(str(stopped))
             raise typer.Exit(NOT_WRITTEN) from None
-        typer.echo(_table([*_state(Ledger.read(opened)), *_effort(report)]))
+        typer.echo(table([*state(Ledger.read(opened)), *_effort(report)]))
 
 
 def status(folder: Dataset) -> None:
@@ -84,10 +84,10 @@ def status(folder: Dataset) -> None:
         ledger = Ledger.read(opened)
         for sentence in ledger.damaged.values():
             say(f"{sentence}; the next run does it again")
-        typer.echo(_table(_state(ledger)))
+        typer.echo(table(state(ledger)))
 
 
-def _state(ledger: Ledger) -> list[tuple[str, str]]:
+def state(ledger: Ledger) -> list[tuple[str, str]]:
     import numpy as np
 
     finished, failed = ledger.finished, ledger.failed
@@ -119,5 +119,5 @@ def _effort(report: RunReport) -> list[tuple[str, str]]:
     ]
 
 
-def _table(rows: list[tuple[str, str]]) -> str:
+def table(rows: list[tuple[str, str]]) -> str:
     return "\n".join(f"{name:<22}{value}" for name, value in rows)

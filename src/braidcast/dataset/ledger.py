@@ -30,8 +30,7 @@ class Ledger:
         records, damaged = {}, {}
         for index in _present(folder):
             try:
-                record = read_case(folder.case_file(index), arrays=False)
-                _check_plan(folder, index, record)
+                record = read_result(folder, index, arrays=False)
             except FileNotFoundError:
                 continue
             except DamagedFile as error:
@@ -61,6 +60,23 @@ class Ledger:
         return Counter(record.reason for record in self.failed).most_common()
 
 
+def read_result(folder: DatasetFolder, index: int, *, arrays: bool = True) -> CaseRecord:
+    """The file of case ``index``, as ``read_case`` reads it, checked to be of this case.
+
+    Raises ``InputError`` if it is of another plan, ``DamagedFile`` if of another case.
+    """
+    path = folder.case_file(index)
+    record = read_case(path, arrays=arrays)
+    if record.plan_id != folder.plan_id:
+        raise InputError(
+            f"{path} belongs to another plan: its plan id = {record.plan_id} must be "
+            f"{folder.plan_id}, that of {folder.path}"
+        )
+    if record.index != index:
+        raise DamagedFile(f"{path} is case {record.index} under the name of another")
+    return record
+
+
 def _present(folder: DatasetFolder) -> Iterator[int]:
     """Cases that have a file; one look at the folder, for each costs a round trip on a cluster."""
     try:
@@ -70,14 +86,3 @@ def _present(folder: DatasetFolder) -> Iterator[int]:
     for index in range(len(folder)):
         if folder.case_file(index).name in names:
             yield index
-
-
-def _check_plan(folder: DatasetFolder, index: int, record: CaseRecord) -> None:
-    path = folder.case_file(index)
-    if record.plan_id != folder.plan_id:
-        raise InputError(
-            f"{path} belongs to another plan: its plan id = {record.plan_id} must be "
-            f"{folder.plan_id}, that of {folder.path}"
-        )
-    if record.index != index:
-        raise DamagedFile(f"{path} is case {record.index} under the name of another")
