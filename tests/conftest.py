@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from braidcast.case import Case
+from braidcast.dataset.hypercube import nested_hypercube
 from braidcast.deployment.result import Deployment
 from braidcast.deployment.simulate import simulate
 
@@ -23,6 +24,7 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["BRAIDCAST_CACHE"] = config.stash[_cache]
     if getattr(config.option, "numprocesses", None):
         simulate(Case.from_dict(plain_tables()))
+        nested_hypercube(2, 1, (), 0, seed=0)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
