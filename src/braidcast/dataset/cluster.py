@@ -7,12 +7,14 @@ import logging
 import os
 import signal
 from collections.abc import Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from multiprocessing import resource_tracker
 
 import dask
 from distributed import Client, LocalCluster
+from distributed.comm import CommClosedError, get_address_host_port
 
 from braidcast.errors import InputError
 
@@ -23,6 +25,7 @@ _SETTINGS = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.worker.profile.enabled": False,
 }
+_PATIENCE = 10.0  # s to reach a scheduler
 _GRACE = 0.5  # s that a busy worker has to end by itself
 
 
@@ -42,19 +45,26 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[tuple[Clie
     """A client, and the address of its dashboard or "".
 
     Of ``workers`` new processes, one thread each, by default one a core, which end with the
-    context; or of the cluster whose ``scheduler`` is at this address.
+    context; or of the cluster whose ``scheduler`` is at this address. A connection that is lost
+    inside the context becomes ``RunStopped``.
     """
     if workers is not None and scheduler is not None:
         raise InputError("workers and scheduler: both given, must be at most one of the two")
     if workers is not None and workers < 1:
         raise InputError(f"workers = {workers} must be a whole number above 0")
-    with _quiet():
-        if scheduler is not None:
-            with _remote(scheduler) as client:
-                yield client, client.dashboard_link or ""
-        else:
-            with _local(workers or available_cores()) as client:
-                yield client, client.dashboard_link if _has_dashboard() else ""
+    try:
+        with _quiet():
+            if scheduler is not None:
+                with _remote(scheduler) as client:
+                    yield client, client.dashboard_link or ""
+            else:
+                with _local(workers or available_cores()) as client:
+                    yield client, client.dashboard_link if _has_dashboard() else ""
+    except (CommClosedError, CancelledError):
+        raise RunStopped(
+            "the scheduler or the connection to it is gone; run again to go on with what is "
+            "not finished"
+        ) from None
 
 
 @contextmanager
@@ -91,7 +101,8 @@ def _started(workers: int) -> LocalCluster:
 def _remote(address: str) -> Iterator[Client]:
     """The cluster of the scheduler at ``address``; ``InputError`` if there is none."""
     try:
-        client = Client(address, timeout=10, set_as_default=False)
+        get_address_host_port(address)  # before a client that is half made waits for nothing
+        client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(
             f"scheduler = {address} must be the address of a running Dask scheduler: {error}"

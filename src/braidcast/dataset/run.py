@@ -6,11 +6,11 @@ import secrets
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from functools import partial
 from pathlib import Path
 
 from distributed import Client, Future, KilledWorker, as_completed
-from distributed.comm import CommClosedError
 from threadpoolctl import threadpool_limits
 
 from braidcast.case import Case
@@ -63,15 +63,15 @@ def run(
         if not waiting:
             return RunReport((), 0.0, 0)
         folder.cases_folder.mkdir(exist_ok=True)
-        if deploy is by_finite_elements:
-            say("compiling and crimping, once for all workers")
-            _prepare(folder, waiting[0])
         job = Job(folder.path.resolve(), folder.plan_id, deploy)
         good = len(ledger.finished)
         try:
             with connected(workers, scheduler) as (client, dashboard):
                 if dashboard:
                     say(f"dashboard: {dashboard}")
+                if deploy is by_finite_elements:
+                    say("compiling and crimping, once for all workers")
+                    _prepare(folder, waiting[0])
                 count = Count(len(folder), good, len(kept) - good, len(waiting))
                 progress(count.progress(_threads(client)))
                 for done in _work_off(client, folder, job, waiting):
@@ -140,20 +140,11 @@ def _result(future: Future, index: int) -> Done | None:
         return future.result()
     except KilledWorker:
         return None
-    except (InputError, MemoryError):
-        raise
-    except CommClosedError:
-        raise RunStopped(_GONE) from None
-    except OSError:
+    except (OSError, InputError, CancelledError):
         raise
     except Exception as error:
-        if future.cancelled():
-            raise RunStopped(_GONE) from None
         reason = f"{type(error).__name__}: {error}"
         raise RunStopped(f"a worker cannot do case {index}: {reason}") from None
-
-
-_GONE = "the scheduler or its connection is gone; run again to go on with what is not finished"
 
 
 def _threads(client: Client) -> int:
