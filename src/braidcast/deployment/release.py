@@ -24,7 +24,7 @@ WALL_STIFFNESS = 50.0
 YIELDING = 0.0025
 """Share of that stiffness while the braid moves."""
 
-HARDENING = 8.0
+HARDENING = 20.0
 """Largest factor by which the wall is then made stiffer at once."""
 
 
@@ -38,7 +38,7 @@ class ReleaseOptions:
     """
 
     duration: float = 12.0
-    move: float = 0.25
+    move: float = 0.6
     tolerance: float = 0.0625
     balance: float = 1e-5
 
@@ -84,16 +84,18 @@ def release(
     natural_time = drag * braid.axis_radius**2 / (force * braid.segment_length)
     newton_options = NewtonOptions(
         tolerance=options.tolerance * braid.wires * force,
-        iterations=8,
+        iterations=12,
         largest_step=options.move,
         largest_turn=0.6,
     )
+    free = replace(newton_options, tolerance=8.0 * newton_options.tolerance)
     opening = RelaxationOptions(
         drag=drag,
         duration=options.duration * natural_time,
-        first_step=0.006 * natural_time,
+        first_step=0.024 * natural_time,
         largest_move=options.move,
         newton=newton_options,
+        free=free,
     )
     motion = relax(_softened(system, YIELDING), positioned, opening, axial=axial, progress=progress)
     if not motion.completed:

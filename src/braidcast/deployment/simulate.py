@@ -142,7 +142,7 @@ def _position(
     progress: Callable[[float], None],
 ) -> tuple[Equilibrium, int]:
     bending = wire_section(braid).EIy
-    options = NewtonOptions(tolerance=0.1 * bending / braid.axis_radius**2, largest_step=0.3)
+    options = NewtonOptions(tolerance=3.0 * bending / braid.axis_radius**2, largest_step=0.3)
     stiffness = 0.1 * bending / braid.segment_length**3
     free = system.with_contacts(())
     return position(free, crimped, np.array(braid.rings), path, stiffness, options, progress)

@@ -20,7 +20,7 @@ from braidcast.mechanics.equilibrium import (
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import Springs, System
 
-HELD = 3.0
+HELD = 4.0
 """Unbalanced forces, in tolerances of a step, that friction may hold."""
 
 
@@ -29,7 +29,9 @@ class RelaxationOptions:
     """``drag`` N s/mm a node; ``duration`` and ``first_step`` s.
 
     ``largest_move`` mm is how far the fastest node should go in a step, ``growth`` how much longer
-    a step may be than the last. A step whose equilibrium is not found is shortened.
+    a step may be than the last. A step whose equilibrium is not found is shortened. ``newton``
+    says how exactly a step is solved, ``free`` how exactly while nothing touches a wall: what is
+    unbalanced then is stretch of the wires, and the next step takes it out.
     """
 
     drag: float
@@ -37,6 +39,7 @@ class RelaxationOptions:
     first_step: float
     largest_move: float
     newton: NewtonOptions
+    free: NewtonOptions
     growth: float = 2.0
     shortest_step: float = 1e-6
 
@@ -68,6 +71,7 @@ def relax(
     that down, only makes points stick and slip in turn.
     """
     last: Equilibrium | None = None
+    touching = False
     memories = system.at_rest(start)
     drag = np.full(len(start.positions), options.drag)
     state, time, step = start, 0.0, options.first_step
@@ -75,15 +79,21 @@ def relax(
     path: list[Array] = []
     while True:
         step = min(step, options.duration - time)
-        attempt = newton(
-            system,
-            state,
-            options.newton,
-            axial=axial,
-            springs=Springs(drag / step, state.positions),
-            memories=memories,
-        )
+        springs = Springs(drag / step, state.positions)
+        accuracy = options.newton if touching else options.free
+        attempt = newton(system, state, accuracy, axial=axial, springs=springs, memories=memories)
         iterations += attempt.iterations
+        if not touching and attempt.converged and _touches(attempt):
+            touching = True
+            attempt = newton(
+                system,
+                attempt.state,
+                options.newton,
+                axial=attempt.axial,
+                springs=springs,
+                memories=memories,
+            )
+            iterations += attempt.iterations
         move = float(np.linalg.norm(attempt.state.positions - state.positions, axis=1).max())
         if last is not None and not attempt.converged:
             if attempt.residuals[0] <= HELD * options.newton.tolerance:
@@ -107,3 +117,7 @@ def relax(
         if time >= options.duration * (1.0 - 1e-12):
             return Relaxation(last, True, "the time is over", steps, iterations, tuple(path))
         step *= min(options.growth, max(0.3, options.largest_move / max(move, 1e-12)))
+
+
+def _touches(equilibrium: Equilibrium) -> bool:
+    return any(contact.total > 0.0 for contact in equilibrium.evaluation.contacts)
