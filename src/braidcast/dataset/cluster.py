@@ -90,7 +90,7 @@ def _started(workers: int) -> LocalCluster:
             threads_per_worker=1,
             # A case takes what it takes: Dask would kill what the system still bears.
             memory_limit=None,
-            dashboard_address="127.0.0.1:0" if _has_dashboard() else None,
+            dashboard_address="127.0.0.1:0",  # any free port
             silence_logs=logging.CRITICAL,
         )
     except (RuntimeError, OSError) as error:

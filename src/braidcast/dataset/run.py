@@ -19,7 +19,15 @@ from braidcast.dataset.cluster import RunStopped, connected
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.dataset.ledger import Ledger
 from braidcast.dataset.progress import Count, Progress, RunReport
-from braidcast.dataset.work import Deploy, Done, Job, by_finite_elements, do_case, give_up
+from braidcast.dataset.work import (
+    Deploy,
+    Done,
+    Job,
+    by_finite_elements,
+    do_case,
+    give_up,
+    reason_of,
+)
 from braidcast.deployment.crimp import CrimpingFailed, crimped_state
 from braidcast.errors import InputError
 
@@ -143,7 +151,7 @@ def _result(future: Future, index: int) -> Done | None:
     except (OSError, InputError, CancelledError):
         raise
     except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
+        reason = reason_of(error.__cause__ or error)  # Dask's own says only where it was
         raise RunStopped(f"a worker cannot do case {index}: {reason}") from None
 
 

@@ -13,11 +13,11 @@ from braidcast.dataset.case_file import (
     DamagedFile,
     Origin,
     failure,
-    read_case,
     record,
     write_case,
 )
 from braidcast.dataset.folder import DatasetFolder
+from braidcast.dataset.ledger import read_result
 from braidcast.deployment.result import Deployment
 from braidcast.deployment.simulate import simulate
 from braidcast.errors import InputError
@@ -65,7 +65,7 @@ def do_case(job: Job, index: int) -> Done:
     try:
         result = record(job.deploy(folder.case(index), folder.crimped), origin)
     except Exception as error:  # whatever goes wrong in a case is that case's failure
-        result = failure(origin, _reason(error))
+        result = failure(origin, reason_of(error))
     write_case(folder.case_file(index), result, origin)
     return _done(result)
 
@@ -87,6 +87,12 @@ def origin_of(folder: DatasetFolder, index: int) -> Origin:
     return Origin(folder.plan_id, index, folder.case(index).to_toml(), parameters)
 
 
+def reason_of(error: BaseException) -> str:
+    """What went wrong, in one line that is not too long."""
+    text = " ".join(f"{type(error).__name__}: {error}".split())
+    return text if len(text) <= _LONGEST_REASON else text[: _LONGEST_REASON - 3] + "..."
+
+
 @lru_cache(maxsize=4)
 def _opened(path: Path, plan_id: str) -> DatasetFolder:
     folder = DatasetFolder.open(path)
@@ -98,7 +104,7 @@ def _opened(path: Path, plan_id: str) -> DatasetFolder:
 def _already_finished(folder: DatasetFolder, index: int) -> CaseRecord | None:
     """The file of a worker that died, or was lost from sight, once it had written it."""
     try:
-        found = read_case(folder.case_file(index), arrays=False)
+        found = read_result(folder, index, arrays=False)
     except (OSError, DamagedFile):
         return None
     return found if found.finished else None
@@ -107,8 +113,3 @@ def _already_finished(folder: DatasetFolder, index: int) -> CaseRecord | None:
 def _done(result: CaseRecord) -> Done:
     cpu_seconds = float(result.values.get("cpu_seconds", 0.0))
     return Done(result.index, result.finished, result.reason, cpu_seconds)
-
-
-def _reason(error: Exception) -> str:
-    text = " ".join(f"{type(error).__name__}: {error}".split())
-    return text if len(text) <= _LONGEST_REASON else text[: _LONGEST_REASON - 3] + "..."
