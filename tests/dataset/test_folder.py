@@ -215,8 +215,11 @@ def test_a_store_of_a_newer_version_is_refused(dataset: DatasetFolder) -> None:
 
 @pytest.mark.parametrize(
     "content",
-    ["", "{", "[]", "3", "{}", '{"store_version": "1"}', '{"store_version": 1}', "\0", "[" * 99999],
-    ids=lambda content: content[:20],
+    [
+        *("", "{", "[]", "3", "{}", "\0", "[" * 99999, '{"store_version": 1}'),
+        *('{"store_version": "1", "replaced": 0}', '{"store_version": 0, "replaced": 0}'),
+    ],
+    ids=lambda content: content[:25],
 )
 def test_a_damaged_stamp_is_refused(dataset: DatasetFolder, content: str) -> None:
     (dataset.path / "dataset.json").write_text(content)

@@ -12,7 +12,8 @@ from scipy.stats import qmc
 
 from braidcast.dataset.hypercube import (
     MOST_SWAPPED,
-    best_replacement,
+    BoolArray,
+    best_candidate,
     nested_hypercube,
     nested_sets,
 )
@@ -27,8 +28,12 @@ DrawProgress = Callable[[str, float], None]
 _MOST_INFEASIBLE = 0.9
 #: … but not before so many samples.
 _LEAST_TRIED = 100
-#: From so many feasible samples the one is chosen that takes the place of an infeasible one.
-_CANDIDATES = 16
+#: From so many feasible samples the one is chosen that takes the place of an infeasible one;
+_CANDIDATES = 64
+#: from fewer if that times cases times replacements would be more: some ten seconds.
+_MOST_WORK = 2e8
+#: So many feasible samples stand for the region to fill.
+_REGION = 500
 
 
 class Drawn(NamedTuple):
@@ -43,8 +48,9 @@ def draw(plan: Plan, progress: DrawProgress | None = None) -> Drawn:
     """Draw the cases of ``plan``, all of them feasible; the same plan gives the same cases.
 
     They are a Latin hypercube with nested subsets. Where a sample of it is infeasible it gives way
-    to one of 16 feasible ones drawn uniformly: to that which leaves the subsets most evenly spread.
-    ``InputError`` if more than nine in ten samples are infeasible; it names the last reason.
+    to one of 64 feasible ones drawn uniformly: to that which leaves the subsets most evenly spread
+    over what is feasible. ``InputError``, with the last reason, if more than nine in ten samples
+    are infeasible.
     """
     report = progress or _no_progress
     if not plan.ranges:
@@ -54,20 +60,35 @@ def draw(plan: Plan, progress: DrawProgress | None = None) -> Drawn:
         plan.cases, len(plan.ranges), plan.subsets, plan.tests, plan.seed, partial(report, "draw")
     )
     check = _Check(plan)
-    infeasible = []
+    present = np.ones(plan.cases, dtype=bool)
     for place, point in enumerate(points):
-        if not check.is_feasible(point):
-            infeasible.append(place)
+        present[place] = check.is_feasible(point)
         report("check", (place + 1) / plan.cases)
+    replaced = int((~present).sum())
+    if replaced:
+        _replace(plan, check, points, present, partial(report, "replace"))
+    return Drawn(_scaled(plan, points), replaced)
+
+
+def _replace(
+    plan: Plan,
+    check: _Check,
+    points: Array,
+    present: BoolArray,
+    report: Callable[[float], None],
+) -> None:
+    """Put feasible points in the places of ``points`` that are not ``present``."""
     fresh = _feasible(check, np.random.default_rng([plan.seed, 1]))
+    region = np.array([next(fresh) for _ in range(_REGION)])
+    places = np.flatnonzero(~present).tolist()
+    count = min(_CANDIDATES, 1 + int(_MOST_WORK / (len(points) * len(places))))
+    candidates = [next(fresh) for _ in range(count)]
     sets = nested_sets(plan.cases, plan.subsets, plan.tests)
-    candidates: list[Array] = []
-    for done, place in enumerate(infeasible):
-        report("replace", (done + 1) / len(infeasible))
-        while len(candidates) < _CANDIDATES:
-            candidates.append(next(fresh))
-        points[place] = candidates.pop(best_replacement(points, place, np.array(candidates), sets))
-    return Drawn(_scaled(plan, points), len(infeasible))
+    for done, place in enumerate(places):
+        best = best_candidate(np.array(candidates), place, points, present, sets, region)
+        points[place], candidates[best] = candidates[best], next(fresh)
+        present[place] = True
+        report((done + 1) / len(places))
 
 
 def discrepancies(plan: Plan, values: Array) -> dict[int, float]:

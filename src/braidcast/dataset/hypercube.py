@@ -16,6 +16,7 @@ from scipy.stats import qmc
 from braidcast.dataset.discrepancy import discrepancies, sums, try_swaps
 
 Array = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 Sets = Sequence[tuple[int, int]]
 """Sets of successive points: where each begins and, exclusively, ends."""
 
@@ -79,21 +80,26 @@ def spread(
     return columns.T.copy(), discrepancies(dimensions, first, last, a_sums, k_sums)
 
 
-def best_replacement(points: Array, place: int, candidates: Array, sets: Sets) -> int:
+def best_candidate(
+    candidates: Array, place: int, points: Array, present: BoolArray, sets: Sets, region: Array
+) -> int:
     """Which of ``candidates``, put at ``place``, leaves the sets it is in most evenly spread.
 
-    The least sum of m CD over these sets: the discrepancy falls as 1/m, so that sets of all sizes
-    weigh alike.
+    Spread over the region of which ``region`` is a uniform sample: a(x), which is the mean of
+    k(x, y) over all y of the cube, becomes that over y in the region. Of ``points`` those count
+    that are ``present``. The least sum of m CD over the sets: the discrepancy falls as 1/m, so that
+    sets of all sizes weigh alike.
     """
-    to_points = _kernel(candidates[:, None], points[None])
-    to_points[:, place] = 0.0
+    if len(candidates) == 1:
+        return 0
+    to_points = np.where(present, _kernel(candidates[:, None], points[None]), 0.0)
     itself = _kernel(candidates, candidates)
-    u = np.abs(candidates - 0.5)
-    a = np.prod(1.0 + 0.5 * u - 0.5 * u**2, axis=1)
+    to_region = _kernel(candidates[:, None], region[None]).mean(axis=1)
     cost = np.zeros(len(candidates))
     for begin, end in sets:
         if begin <= place < end:
-            cost += (2.0 * to_points[:, begin:end].sum(axis=1) + itself) / (end - begin) - 2.0 * a
+            m = 1 + present[begin:end].sum()
+            cost += (2.0 * to_points[:, begin:end].sum(axis=1) + itself) / m - 2.0 * to_region
     return int(np.argmin(cost))
 
 
