@@ -23,11 +23,11 @@ class RunDisplay:
 
     def __init__(self, terminal: bool) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
         from rich.progress import Progress as Bars
 
         self.bars = Bars(
-            TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+            MofNCompleteColumn(),
             BarColumn(bar_width=None),
             TextColumn("{task.description}"),
             TimeElapsedColumn(),
@@ -57,6 +57,7 @@ class RunDisplay:
 
 @contextmanager
 def run_display() -> Iterator[RunDisplay]:
+    """A display, on the screen as long as the context lasts."""
     shown = RunDisplay(sys.stderr.isatty())
     with shown.bars:
         yield shown
