@@ -34,12 +34,14 @@ class NotConverged(Exception):
 
 
 class Braid:
-    """The model in OpenSees; nodes are numbered ring by ring, which keeps the band narrow."""
+    """The model in OpenSees; nodes are numbered ring by ring for a narrow band."""
 
     def __init__(self, ops: Any, mesh: given.Mesh, options: argparse.Namespace) -> None:
         self.ops, self.mesh, self.options = ops, mesh, options
         count = len(mesh.nodes)
-        order = np.lexsort((np.round(mesh.angle % (2.0 * np.pi), 9), mesh.ring))
+        # within a ring from angle 0 both ways, which halves the band
+        away = np.abs((mesh.angle + np.pi) % (2.0 * np.pi) - np.pi)
+        order = np.lexsort((np.round(away, 9), mesh.ring))
         self.tags = np.empty(count, dtype=int)
         self.tags[order] = np.arange(1, count + 1)
         ops.wipe()

@@ -28,6 +28,10 @@ HARDENING = 20.0
 """Largest factor by which the wall is then made stiffer at once."""
 
 
+BALANCING = 20
+"""Largest number of equilibria on the way to the one without drag."""
+
+
 @dataclass(frozen=True)
 class ReleaseOptions:
     """Accuracy of the release.
@@ -106,7 +110,7 @@ def release(
     iterations += motion.iterations
     if last.converged:
         total = sum(contact.total for contact in last.evaluation.contacts)
-        final = replace(newton_options, iterations=12, tolerance=options.balance * total)
+        final = replace(newton_options, iterations=8, tolerance=options.balance * total)
         if system.problem.contacts[0].friction > 0.0:
             last, spent = _balance(stiff, last, stiffness, final)
         else:
@@ -154,25 +158,24 @@ def _harden(
 def _balance(
     system: System, start: Equilibrium, drag: Array, options: NewtonOptions
 ) -> tuple[Equilibrium, int]:
-    """Equilibrium without drag; where Newton does not find it, with ever less drag first."""
-    last, iterations = start, 0
-    for share in (0.0, 1.0, 0.3, 0.1, 0.03, 0.01):
-        if share > 0.0:
-            eased = newton(
-                system,
-                last.state,
-                options,
-                axial=last.axial,
-                springs=Springs(share * drag, last.state.positions),
-                memories=last.memories,
-            )
-            iterations += eased.iterations
-            if eased.converged:
-                last = eased
-        attempt = newton(system, last.state, options, axial=last.axial, memories=last.memories)
+    """Equilibrium without drag; where points stick and slip in turn, with much drag first."""
+    last, share, iterations = start, 0.0, 0
+    for _ in range(BALANCING):
+        attempt = newton(
+            system,
+            last.state,
+            options,
+            axial=last.axial,
+            springs=Springs(share * drag, last.state.positions) if share else None,
+            memories=last.memories,
+        )
         iterations += attempt.iterations
-        if attempt.converged:
+        if not attempt.converged:
+            share = max(32.0, 4.0 * share)
+        elif share == 0.0:
             break
+        else:
+            last, share = attempt, share / 4.0 if share > 1.0 else 0.0
     return attempt, iterations
 
 
