@@ -16,15 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from braidcast import Case, Deployment, InputError
 from braidcast.dataset import case_file
-from braidcast.dataset.case_file import (
-    CaseRecord,
-    DamagedFile,
-    Origin,
-    failure,
-    read_case,
-    record,
-    write_case,
-)
+from braidcast.dataset.case_file import DamagedFile, read_case, write_case
+from braidcast.dataset.case_record import CaseRecord, Origin, failure, record
 from braidcast.dataset.fields import ARRAYS, CENTRE, COSTS, RESULTS
 from braidcast.dataset.plan import Range
 
@@ -117,8 +110,9 @@ def test_a_case_without_equilibrium_is_a_failed_one(
     assert found.reason == "the step became too small"
     assert (found.outcome, found.clinical_outcome, found.checksum) == ("", "", "")
     assert set(found.values) == {"cpu_seconds", "wall_seconds"}
-    write_case(tmp_path / "b.nc", failure(origin, "its worker died"), origin)
-    assert read_case(tmp_path / "b.nc").values == {}
+    write_case(tmp_path / "b.nc", failure(origin, "odd \udcff"), origin)
+    other = read_case(tmp_path / "b.nc")
+    assert other.reason == "odd ?" and other.values == {}
 
 
 def test_without_aneurysm_there_is_no_centre(deployment: Deployment, origin: Origin) -> None:

@@ -19,7 +19,8 @@ from distributed import LocalCluster
 
 from braidcast import Case, Deployment, InputError
 from braidcast.dataset import case_file
-from braidcast.dataset.case_file import failure, write_case
+from braidcast.dataset.case_file import write_case
+from braidcast.dataset.case_record import failure
 from braidcast.dataset.cluster import RunStopped
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.dataset.ledger import Ledger

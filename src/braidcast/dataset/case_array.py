@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from braidcast.dataset.case_file import CaseRecord, DamagedFile
+from braidcast.dataset.case_file import DamagedFile
+from braidcast.dataset.case_record import CaseRecord
 from braidcast.dataset.fields import Field
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.dataset.netcdf3 import Place

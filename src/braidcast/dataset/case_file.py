@@ -8,26 +8,19 @@ changes or is cut off later is found out on reading.
 from __future__ import annotations
 
 import hashlib
-import platform
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.io import netcdf_file
-from scipy.spatial.transform import Rotation
 
-from braidcast import __version__
 from braidcast.dataset.atomic import write_atomically
+from braidcast.dataset.case_record import CaseRecord, Origin
 from braidcast.dataset.fields import ARRAYS, CENTRE, COSTS, NUMBERS, RESULTS, Field
 from braidcast.dataset.folder import STORE_VERSION
-from braidcast.dataset.netcdf3 import Place, read_header
-from braidcast.dataset.plan import Range
-from braidcast.deployment.result import Deployment
+from braidcast.dataset.netcdf3 import read_header
 from braidcast.errors import InputError
 
 _NO_SEAL = b"0" * 64
@@ -35,105 +28,6 @@ _NO_SEAL = b"0" * 64
 
 class DamagedFile(ValueError):
     """A case file that is not what was written: cut off, changed, or never one."""
-
-
-@dataclass(frozen=True)
-class Origin:
-    """Which case of which plan a file belongs to."""
-
-    plan_id: str
-    index: int
-    toml: str
-    """The case itself, as the text of a case file."""
-    parameters: tuple[tuple[Range, float], ...]
-
-
-@dataclass(frozen=True, eq=False)
-class CaseRecord:
-    """What is known of a case that was simulated.
-
-    ``values`` holds the fields of ``braidcast.dataset.fields`` by name: all of them if the status
-    is "finished", only what it cost and where the sac is if "failed". ``places`` says where in the
-    file they came from.
-    """
-
-    plan_id: str
-    index: int
-    status: Literal["finished", "failed"]
-    reason: str
-    outcome: str
-    clinical_outcome: str
-    values: Mapping[str, NDArray[Any]]
-    toml: str
-    versions: str
-    checksum: str
-    """SHA-256 over the results, not over times and versions; empty if the case failed."""
-    places: Mapping[str, Place] = field(default_factory=dict)
-
-    @property
-    def finished(self) -> bool:
-        return self.status == "finished"
-
-
-def record(deployment: Deployment, origin: Origin) -> CaseRecord:
-    """What is kept of a deployment; one without equilibrium is a failed case."""
-    costs = {
-        "cpu_seconds": np.array(deployment.cpu_seconds),
-        "wall_seconds": np.array(deployment.wall_seconds),
-    }
-    if not deployment.converged:
-        return failure(origin, deployment.reason or "no equilibrium", costs)
-    centre = deployment.case.aneurysm_centre
-    values = {
-        "positions": deployment.positions,
-        "rotation_vector": Rotation.from_matrix(deployment.rotations).as_rotvec(),
-        "contact_force": deployment.contact_force,
-        "positioned_centreline": deployment.positioned_centreline,
-        "newton_iterations": deployment.newton_iterations,
-        "residual": deployment.residual_N,
-        "residual_relative": deployment.residual_relative,
-        "strain_energy": deployment.strain_energy_mJ,
-        "deployed_length": deployment.deployed_length_mm,
-        "crimped_length": deployment.crimped_length_mm,
-        "max_penetration": deployment.max_penetration_mm,
-        "end_nodes_in_sac": deployment.end_nodes_in_sac,
-    }
-    results = {f.name: np.asarray(values[f.name], dtype=f">{f.dtype}") for f in RESULTS}
-    labels = (deployment.outcome, deployment.clinical_outcome)
-    return CaseRecord(
-        plan_id=origin.plan_id,
-        index=origin.index,
-        status="finished",
-        reason=deployment.reason,
-        outcome=labels[0],
-        clinical_outcome=labels[1],
-        values={
-            **results,
-            **costs,
-            "aneurysm_centre": np.full(3, np.nan) if centre is None else centre,
-        },
-        toml=origin.toml,
-        versions=_versions(),
-        checksum=_checksum(results, labels),
-    )
-
-
-def failure(
-    origin: Origin, reason: str, costs: Mapping[str, NDArray[Any]] | None = None
-) -> CaseRecord:
-    """A case that gave no result, and why."""
-    return CaseRecord(
-        plan_id=origin.plan_id,
-        index=origin.index,
-        status="failed",
-        reason=reason,
-        outcome="",
-        clinical_outcome="",
-        values=costs or {},
-        toml=origin.toml,
-        versions=_versions(),
-        checksum="",
-    )
 
 
 def write_case(path: Path, record: CaseRecord, origin: Origin) -> None:
@@ -204,7 +98,7 @@ def _netcdf(record: CaseRecord, origin: Origin) -> bytes:
     }
     for name, text in texts.items():
         if text:  # netCDF-3 has no empty texts
-            setattr(file, name, text.encode("utf-8"))
+            setattr(file, name, text.encode("utf-8", "replace"))
     sizes: dict[str, int] = {}
     for known in (*ARRAYS, *NUMBERS, *COSTS, CENTRE):
         if known.name in record.values:
@@ -245,16 +139,3 @@ def _seal_place(content: bytes) -> slice:
     """Where the 64 characters of the seal are: after its name, its type and its length."""
     start = content.index(b"seal") + 12
     return slice(start, start + len(_NO_SEAL))
-
-
-def _checksum(results: Mapping[str, NDArray[Any]], labels: tuple[str, str]) -> str:
-    digest = hashlib.sha256("\0".join(labels).encode())
-    for name, values in results.items():
-        digest.update(name.encode())
-        digest.update(values.tobytes())
-    return digest.hexdigest()
-
-
-def _versions() -> str:
-    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
-    return f"braidcast {__version__}, {packages}, python {platform.python_version()}"

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from braidcast.dataset.case_file import CaseRecord, DamagedFile, read_case
+from braidcast.dataset.case_file import DamagedFile, read_case
+from braidcast.dataset.case_record import CaseRecord
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.errors import InputError
 

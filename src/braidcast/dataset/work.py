@@ -8,14 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 
 from braidcast.case import Case
-from braidcast.dataset.case_file import (
-    CaseRecord,
-    DamagedFile,
-    Origin,
-    failure,
-    record,
-    write_case,
-)
+from braidcast.dataset.case_file import DamagedFile, write_case
+from braidcast.dataset.case_record import CaseRecord, Origin, failure, record
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.dataset.ledger import read_result
 from braidcast.deployment.result import Deployment
