@@ -89,6 +89,8 @@ def release(
     newton_options = NewtonOptions(
         tolerance=options.tolerance * braid.wires * force,
         iterations=12,
+        relative=0.1,
+        rises=1,
         largest_step=options.move,
         largest_turn=0.6,
     )
@@ -110,7 +112,9 @@ def release(
     iterations += motion.iterations
     if last.converged:
         total = sum(contact.total for contact in last.evaluation.contacts)
-        final = replace(newton_options, iterations=8, tolerance=options.balance * total)
+        final = replace(
+            newton_options, iterations=8, relative=0.0, tolerance=options.balance * total
+        )
         if system.problem.contacts[0].friction > 0.0:
             last, spent = _balance(stiff, last, stiffness, final)
         else:
@@ -129,7 +133,7 @@ def _harden(
     the threshold of its contact. Returns the stiff system, the equilibrium or the last attempt,
     and all Newton iterations.
     """
-    options = replace(options, iterations=15)
+    options = replace(options, iterations=15, relative=0.01)
     threshold = system.problem.contacts[0].threshold
     last, share, factor, iterations = start, YIELDING, HARDENING, 0
     while True:

@@ -24,6 +24,9 @@ from braidcast.mechanics.system import Evaluation, Springs, System, moved
 SMALLEST_SHIFT = 1e-4
 """First raise of an indefinite tangent's diagonal, in units of the bending stiffness."""
 
+PATIENCE = 3
+"""Iterations in which a residual may rise: the first step stretches the wires, the next mend it."""
+
 Progress = Callable[[float], None]
 
 
@@ -32,14 +35,18 @@ class NewtonOptions:
     """When an equilibrium is reached and how far a step may go.
 
     ``tolerance``: largest sum of unbalanced nodal forces (moments divided by the mean element
-    length), N, or what rounding leaves where that is more; ``largest_step`` mm and
-    ``largest_turn`` rad a node and iteration.
+    length), N, or what rounding leaves where that is more, or ``relative`` times the sum before
+    the first step; ``largest_step`` mm and
+    ``largest_turn`` rad a node and iteration. More than ``rises`` times in a row, after the first
+    ``PATIENCE`` iterations, the unbalanced force may not rise.
     """
 
     tolerance: float = 1e-8
+    relative: float = 0.0
     iterations: int = 30
     largest_step: float = np.inf
     largest_turn: float = 1.0
+    rises: int = 30
 
 
 @dataclass(frozen=True)
@@ -130,6 +137,7 @@ def newton(
         )
         residual = residual_norm(system, evaluation.gradient)
         residuals.append(residual)
+        tolerance = max(tolerance, options.relative * residuals[0])
         if not np.isfinite(residual):
             reason = "the forces are no longer finite"
             break
@@ -137,6 +145,9 @@ def newton(
             converged, reason = True, f"unbalanced force below {tolerance:.3g} N"
             break
         if iterations == options.iterations:
+            break
+        if _rises(residuals) > options.rises:
+            reason = f"the unbalanced force kept rising, to {residual:.3g} N"
             break
         try:
             solve, shift = factorise(system, evaluation, shift)
@@ -166,6 +177,13 @@ def newton(
         memories,
         tuple(residuals),
     )
+
+
+def _rises(residuals: list[float]) -> int:
+    """How often in a row, up to now, the residual has risen since the first iterations."""
+    settled = residuals[PATIENCE:]
+    falls = [i for i in range(1, len(settled)) if settled[i] <= settled[i - 1]]
+    return len(settled) - 1 - (falls[-1] if falls else 0) if settled else 0
 
 
 def _shortening(step: Array, options: NewtonOptions) -> float:
