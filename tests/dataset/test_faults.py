@@ -63,6 +63,7 @@ def deadly(pretended: Deploy, always: float, once: float, case: Case, crimped: P
 
 
 @posix
+@pytest.mark.slow
 def test_a_worker_killed_by_its_case(folder: DatasetFolder, pretended: Deploy) -> None:
     etas = [folder.case(index).site.eta for index in range(6)]
     deploy = partial(deadly, pretended, etas[1], etas[4])

@@ -27,6 +27,7 @@ def do_here(folder: DatasetFolder, deploy: Deploy, *indices: int) -> list[Done]:
     return [do_case(Job(folder.path, folder.plan_id, deploy), index) for index in indices]
 
 
+@pytest.mark.slow
 def test_processes_of_its_own(folder: DatasetFolder, pretended: Deploy, tmp_path: Path) -> None:
     said: list[str] = []
     seen: list[Progress] = []
