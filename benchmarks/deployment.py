@@ -7,7 +7,6 @@ sources, is not run again. Ends with 1 if a bar is missed.
 """
 
 import argparse
-import hashlib
 import json
 import multiprocessing
 import os
@@ -27,6 +26,7 @@ from braidcast.case import Case
 from braidcast.deployment.crimp import crimped_state
 from braidcast.deployment.release import ReleaseOptions
 from braidcast.deployment.simulate import simulate
+from braidcast.deployment.sources import fingerprint
 from report import page
 
 NAMES = ("y_P1", "z_P1", "D_v", "D_a", "f", "eta")
@@ -67,18 +67,6 @@ def options_of(variant: str) -> ReleaseOptions:
     return options
 
 
-def sources() -> str:
-    """Fingerprint of everything a simulation is made by."""
-    package = Path(braidcast.__file__).parent
-    files = [package / "case.py"]
-    for layer in ("mechanics", "devices", "vessels", "deployment"):
-        files += sorted((package / layer).glob("*.py"))
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(file.name.encode() + file.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 def cholesky_seconds(repeats: int) -> list[float]:
     """CPU seconds of numpy's Cholesky of 3000 x 3000, the yardstick of machines."""
     root = np.random.default_rng(0).standard_normal((3000, 3000))
@@ -99,7 +87,7 @@ def peak_memory() -> float:
     return size / (1e6 if sys.platform == "darwin" else 1e3)
 
 
-def run(number: int, variant: str, folder: Path, fingerprint: str, solver: str) -> dict[str, Any]:
+def run(number: int, variant: str, folder: Path, made_by: str, solver: str) -> dict[str, Any]:
     """One simulation, in a process of its own, written to ``folder``."""
     small = plan()[number].to_dict()
     small["device"] = {"wires": 12, "segments": 24}
@@ -109,7 +97,7 @@ def run(number: int, variant: str, folder: Path, fingerprint: str, solver: str) 
     record = {
         "case": number,
         "variant": variant,
-        "sources": fingerprint,
+        "sources": made_by,
         "version": braidcast.__version__,
         "linear_solver": solver,
         "parameters": dict(zip(NAMES, parameters(number), strict=True)),
@@ -156,13 +144,13 @@ def write(path: Path, text: str) -> None:
     os.replace(temporary, path)
 
 
-def kept(path: Path, fingerprint: str, solver: str) -> dict[str, Any] | None:
+def kept(path: Path, made_by: str, solver: str) -> dict[str, Any] | None:
     """The record of an earlier run of the same sources, or None."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    same = (record.get("sources"), record.get("linear_solver")) == (fingerprint, solver)
+    same = (record.get("sources"), record.get("linear_solver")) == (made_by, solver)
     return record if same and path.with_suffix(".npy").exists() else None
 
 
@@ -191,14 +179,14 @@ def main() -> int:
     given = arguments()
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # for the workers; numpy reads it on import
     given.output.mkdir(parents=True, exist_ok=True)
-    fingerprint = sources()
+    made_by = fingerprint()
     cases = plan()[: given.cases]
     variants = VARIANTS if given.variants == "all" else VARIANTS[:1]
     records, wanted = [], []
     for variant in variants:
         for number in range(len(cases)):
             path = given.output / f"{number:02d}-{variant}.json"
-            record = kept(path, fingerprint, given.linear_solver)
+            record = kept(path, made_by, given.linear_solver)
             if record is None:
                 path.unlink(missing_ok=True)
                 wanted.append((number, variant))
@@ -210,8 +198,7 @@ def main() -> int:
         given.jobs, multiprocessing.get_context("spawn"), max_tasks_per_child=1
     ) as pool:
         runs = [
-            pool.submit(run, *which, given.output, fingerprint, given.linear_solver)
-            for which in wanted
+            pool.submit(run, *which, given.output, made_by, given.linear_solver) for which in wanted
         ]
         for done, future in enumerate(as_completed(runs), start=1):
             record = future.result()

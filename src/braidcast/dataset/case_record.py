@@ -6,6 +6,7 @@ import hashlib
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.metadata import version
 from typing import Any, Literal
 
@@ -18,6 +19,7 @@ from braidcast.dataset.fields import RESULTS
 from braidcast.dataset.netcdf3 import Place
 from braidcast.dataset.plan import Range
 from braidcast.deployment.result import Deployment
+from braidcast.deployment.sources import fingerprint
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ def record(deployment: Deployment, origin: Origin) -> CaseRecord:
             "aneurysm_centre": np.full(3, np.nan) if centre is None else centre,
         },
         toml=origin.toml,
-        versions=_versions(),
+        versions=code_versions(),
         checksum=_checksum(results, labels),
     )
 
@@ -114,7 +116,7 @@ def failure(
         clinical_outcome="",
         values=costs or {},
         toml=origin.toml,
-        versions=_versions(),
+        versions=code_versions(),
         checksum="",
     )
 
@@ -127,6 +129,9 @@ def _checksum(results: Mapping[str, NDArray[Any]], labels: tuple[str, str]) -> s
     return digest.hexdigest()
 
 
-def _versions() -> str:
+@cache
+def code_versions() -> str:
+    """What the cases of this process are made by, down to the sources of the simulation."""
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
-    return f"braidcast {__version__}, {packages}, python {platform.python_version()}"
+    braidcast = f"braidcast {__version__} (sources {fingerprint()})"
+    return f"{braidcast}, {packages}, python {platform.python_version()}"

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from braidcast.case import Case
 from braidcast.dataset.atomic import TEMPORARY
+from braidcast.dataset.case_record import code_versions
 from braidcast.dataset.cluster import RunStopped, connected
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.dataset.ledger import Ledger
@@ -66,6 +67,9 @@ def run(
         ledger = Ledger.read(folder)
         for sentence in ledger.damaged.values():
             say(f"{sentence}; it is done again")
+        others = sum(record.versions != code_versions() for record in ledger.finished)
+        if others:
+            say(f"{others} cases were finished by other versions than {code_versions()}")
         kept = {i: r for i, r in ledger.records.items() if r.finished or not retry_failed}
         waiting = [index for index in range(len(folder)) if index not in kept]
         if not waiting:
