@@ -29,8 +29,8 @@ POISSON_RATIO = 0.33
 CRIMPED_RADIUS = 0.45 * FREE_RADIUS
 OPENED_RADIUS = 1.5
 
-TUBE_RADIUS = 1.513
-"""Inner radius: wires touch it with their axes 1 µm inside the opened radius, all pressed."""
+TUBE_RADIUS = OPENED_RADIUS + WIRE_RADIUS
+"""Inner radius: the opened braid touches the tube everywhere and presses on it nowhere yet."""
 
 WALL_STIFFNESS = 1.0
 """Line force per penetration, N/mm^2: the wall gives way by less than a micrometre."""

@@ -1,6 +1,6 @@
 """braidcast and OpenSees on the same braid, side by side; see README.md.
 
-python benchmarks/peers/compare.py --xara PYTHON [--openseespy PYTHON] [--repeats N] [-o FILE]
+python benchmarks/peers/compare.py [--xara PYTHON] [--openseespy PYTHON] [-o FILE]
 
 Prints a page in Markdown. Ends with 1 if a bar is missed, with 2 if a code found no equilibrium.
 """
@@ -23,11 +23,19 @@ HERE = Path(__file__).parent
 TIME_LIMIT = 1500.0
 """Seconds a process may take by the clock."""
 
+ENGINES = ("xara", "openseespy")
+
+SPARSE = ("--steps", "3", "1", "--numberer", "AMD", "--system", "UmfPack")
+SPRING_JOINTS = ("--joints", "spring", "--handler", "Plain")
+
 OPTIONS = {
-    "xara": ("--steps", "2", "1"),
-    "openseespy": ("--joints", "spring", "--handler", "Plain", "--steps", "3", "1"),
+    ("xara", "tuned"): ("--steps", "2", "1"),
+    ("xara", "sparse"): SPARSE,
+    ("openseespy", "tuned"): (*SPRING_JOINTS, "--steps", "2", "1"),
+    ("openseespy", "sparse"): (*SPRING_JOINTS, *SPARSE),
 }
-"""What was fastest for each, see README.md."""
+"""Tuned: the fastest we found for this braid. Sparse: OpenSees's own numbering and sparse solver,
+in the fewest increments that converge."""
 
 RATIO_BAR = 15.0
 
@@ -90,13 +98,13 @@ def at(result: Result, place: tuple[str, ...]) -> float:
     return float(value)
 
 
-def page(results: list[list[Result]], refinement: int) -> tuple[str, bool]:
+def page(names: list[str], results: list[list[Result]], refinement: int) -> tuple[str, bool]:
     """Markdown for the runs of each code, ours first, and whether all bars are held."""
     first = [runs[0] for runs in results]
-    names = [result["version"] for result in first]
+    versions = dict.fromkeys(result["version"] for result in first)
     finer = f"; {refinement} elements from crossing to crossing" if refinement > 1 else ""
     lines = [
-        f"{platform.machine()}, {_processor()}, {os.cpu_count()} cores; {', '.join(names)}; "
+        f"{platform.machine()}, {_processor()}, {os.cpu_count()} cores; {', '.join(versions)}; "
         f"{date.today().isoformat()}; {len(results[0])} runs each in turn, one thread, medians of "
         f"CPU seconds{finer}",
         "",
@@ -164,32 +172,36 @@ def write(path: Path, text: str) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for engine in OPTIONS:
+    for engine in ENGINES:
         parser.add_argument(f"--{engine}", metavar="PYTHON", help="a Python that has it")
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--tuned", action="store_true", help="leave the sparse solver out")
     parser.add_argument("--refinement", type=int, default=1, help="elements between crossings")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="where the page goes too")
     arguments = parser.parse_args()
-    engines = [engine for engine in OPTIONS if getattr(arguments, engine)]
-    if not engines or arguments.repeats < 1:
-        parser.error("give --xara or --openseespy, and one repeat or more")
     finer = ["--refinement", str(arguments.refinement)]
     commands = [[sys.executable, str(HERE / "ours.py"), *finer]]
-    for engine in engines:
-        script = [getattr(arguments, engine), str(HERE / "theirs_opensees.py"), "--engine", engine]
-        commands.append([*script, *OPTIONS[engine], *finer])
+    settings = ["braidcast"]
+    for (engine, setting), options in OPTIONS.items():
+        python = getattr(arguments, engine)
+        if python and not (arguments.tuned and setting != "tuned"):
+            script = [python, str(HERE / "theirs_opensees.py"), "--engine", engine]
+            commands.append([*script, *options, *finer])
+            settings.append(f"{engine} {setting}")
+    if len(commands) < 2 or arguments.repeats < 1:
+        parser.error("give --xara or --openseespy, and one repeat or more")
     results: list[list[Result]] = [[] for _ in commands]
     try:
         run(commands[0])  # what numba compiles is in its cache from here on
         for repeat in range(arguments.repeats):
-            for command, runs in zip(commands, results, strict=True):
+            for name, command, runs in zip(settings, commands, results, strict=True):
                 runs.append(run(command))
-                said = f"{repeat + 1}: {runs[-1]['version']} {solve_seconds(runs[-1]):.2f} s"
-                print(said, file=sys.stderr, flush=True)
+                seconds = solve_seconds(runs[-1])
+                print(f"{repeat + 1}: {name} {seconds:.2f} s", file=sys.stderr, flush=True)
     except Failed as failure:
         print(failure, file=sys.stderr)
         return 2
-    text, held = page(results, arguments.refinement)
+    text, held = page(settings, results, arguments.refinement)
     print(text)
     if arguments.output:
         write(arguments.output, text)
