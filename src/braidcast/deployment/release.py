@@ -28,8 +28,11 @@ HARDENING = 20.0
 """Largest factor by which the wall is then made stiffer at once."""
 
 
-BALANCING = 20
+BALANCING = 60
 """Largest number of equilibria on the way to the one without drag."""
+
+MOST_DRAG, LEAST_DRAG = 32.0, 1.0 / 32.0
+"""Drag on that way, in shares of that of the hardening."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,8 @@ class ReleaseOptions:
     """
 
     duration: float = 12.0
-    move: float = 0.6
-    tolerance: float = 0.0625
+    move: float = 0.3
+    tolerance: float = 0.00625
     balance: float = 1e-5
 
 
@@ -91,10 +94,10 @@ def release(
         iterations=12,
         relative=0.1,
         rises=1,
-        largest_step=options.move,
+        largest_step=2.0 * options.move,
         largest_turn=0.6,
     )
-    free = replace(newton_options, tolerance=8.0 * newton_options.tolerance)
+    free = replace(newton_options, tolerance=80.0 * newton_options.tolerance)
     opening = RelaxationOptions(
         drag=drag,
         duration=options.duration * natural_time,
@@ -162,24 +165,29 @@ def _harden(
 def _balance(
     system: System, start: Equilibrium, drag: Array, options: NewtonOptions
 ) -> tuple[Equilibrium, int]:
-    """Equilibrium without drag; where points stick and slip in turn, with much drag first."""
+    """Equilibrium without drag.
+
+    Where that is not found, because points stick and slip in turn or a loop of wire in the sac has
+    a way to go, much drag is put back and taken off by and by.
+    """
     last, share, iterations = start, 0.0, 0
+    eased = replace(options, relative=0.1, iterations=12)
     for _ in range(BALANCING):
         attempt = newton(
             system,
             last.state,
-            options,
+            eased if share else options,
             axial=last.axial,
             springs=Springs(share * drag, last.state.positions) if share else None,
             memories=last.memories,
         )
         iterations += attempt.iterations
-        if not attempt.converged:
-            share = max(32.0, 4.0 * share)
-        elif share == 0.0:
+        if attempt.converged and share == 0.0:
             break
+        if attempt.converged:
+            last, share = attempt, share / 4.0 if share > LEAST_DRAG else 0.0
         else:
-            last, share = attempt, share / 4.0 if share > 1.0 else 0.0
+            share = 4.0 * share if share else (MOST_DRAG if last is start else 4.0 * LEAST_DRAG)
     return attempt, iterations
 
 

@@ -20,7 +20,7 @@ from braidcast.mechanics.equilibrium import (
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import Springs, System
 
-HELD = 4.0
+HELD = 40.0
 """Unbalanced forces, in tolerances of a step, that friction may hold."""
 
 
@@ -28,7 +28,8 @@ HELD = 4.0
 class RelaxationOptions:
     """``drag`` N s/mm a node; ``duration`` and ``first_step`` s.
 
-    ``largest_move`` mm is how far the fastest node should go in a step, ``growth`` how much longer
+    ``largest_move`` mm is how far the fastest node should go in a step, twice that while nothing
+    touches a wall; ``growth`` how much longer
     a step may be than the last. A step whose equilibrium is not found is shortened. ``newton``
     says how exactly a step is solved, ``free`` how exactly while nothing touches a wall: what is
     unbalanced then is stretch of the wires, and the next step takes it out.
@@ -94,18 +95,19 @@ def relax(
                 memories=memories,
             )
             iterations += attempt.iterations
+        far = options.largest_move if touching else 2.0 * options.largest_move
         move = float(np.linalg.norm(attempt.state.positions - state.positions, axis=1).max())
         if last is not None and not attempt.converged:
             if attempt.residuals[0] <= HELD * options.newton.tolerance:
                 return Relaxation(last, True, "held by friction", steps, iterations, tuple(path))
-        if not attempt.converged or move > 2.0 * options.largest_move:
+        if not attempt.converged or move > 2.0 * far:
             if step <= options.shortest_step * options.duration:
                 reason = f"the motion stopped after {time:.3g} of {options.duration:.3g} s"
                 failed = replace(attempt, state=state)
                 return Relaxation(
                     failed, False, f"{reason}: {attempt.reason}", steps, iterations, tuple(path)
                 )
-            step *= max(0.3, 0.9 * options.largest_move / move) if attempt.converged else 1.0 / 3.0
+            step *= max(0.3, 0.9 * far / move) if attempt.converged else 1.0 / 3.0
             continue
         time, steps = time + step, steps + 1
         state, axial, memories = attempt.state, attempt.axial, attempt.memories
@@ -116,7 +118,7 @@ def relax(
             progress(float(np.log1p(time / scale) / np.log1p(options.duration / scale)))
         if time >= options.duration * (1.0 - 1e-12):
             return Relaxation(last, True, "the time is over", steps, iterations, tuple(path))
-        step *= min(options.growth, max(0.3, options.largest_move / max(move, 1e-12)))
+        step *= min(options.growth, max(0.3, far / max(move, 1e-12)))
 
 
 def _touches(equilibrium: Equilibrium) -> bool:
