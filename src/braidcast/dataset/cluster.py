@@ -24,6 +24,9 @@ _SETTINGS = {
     "distributed.scheduler.worker-saturation": 1.0,
     "distributed.scheduler.allowed-failures": 0,
     "distributed.worker.profile.enabled": False,
+    # Dask makes the C library give back memory at once, to take it again page by page at the next
+    # Newton iteration: half of the time of a simulation. BLAS is held to one thread elsewhere.
+    "distributed.nanny.pre-spawn-environ": {"OMP_NUM_THREADS": 1},
 }
 _PATIENCE = 10.0  # s to reach a scheduler
 _GRACE = 0.5  # s that a busy worker has to end by itself
