@@ -7,11 +7,12 @@ BIN := $(VENV)/bin
 # More BLAS threads than cores make two test workers slower, not faster.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
-.PHONY: help demo test lint types format clean
+.PHONY: help demo study test lint types format clean
 .NOTPARALLEL:
 
 help:
 	@echo "make demo    install braidcast in $(VENV) and simulate examples/success.toml into demo/"
+	@echo "make study   install and simulate the 900 cases of study/plan.toml, or what is missing of them"
 	@echo "make test    install and run the tests"
 	@echo "make lint    ruff: rules and layout"
 	@echo "make types   mypy"
@@ -20,6 +21,9 @@ help:
 
 demo: $(VENV)/.installed-pictures
 	$(BIN)/braidcast simulate examples/success.toml -o demo
+
+study: $(VENV)/.installed-test
+	$(BIN)/python study/rebuild.py
 
 test: $(VENV)/.installed-test
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n $(WORKERS) --dist worksteal

@@ -11,7 +11,7 @@ from braidcast import Case, InputError
 from braidcast.case_toml import toml_text
 from braidcast.dataset.plan import Plan, Range
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "plan.toml"
+HOME = Path(__file__).parents[2]
 
 PLAN = """\
 title = "A plan"
@@ -42,17 +42,19 @@ def complaint(text: str) -> str:
 
 
 def test_the_example_is_the_study() -> None:
-    plan = Plan.from_toml(EXAMPLE)
+    plan = Plan.from_toml(HOME / "study" / "plan.toml")
     assert (plan.cases, plan.subsets, plan.tests) == (900, (150, 300, 600), 100)
     assert [(p.column, p.low, p.high) for p in plan.ranges] == [
-        ("vessel_P1_y_mm", 5.0, 30.0),
+        ("vessel_P1_y_mm", 12.0, 30.0),
         ("vessel_P1_z_mm", 18.0, 32.0),
         ("vessel_diameter_mm", 2.0, 4.0),
         ("aneurysm_diameter_mm", 5.0, 10.0),
-        ("aneurysm_protrusion", 0.3, 0.8),
+        ("aneurysm_protrusion", 0.3, 0.6),
         ("site_eta", 0.0, 1.0),
     ]
-    assert plan.case([6.0, 20.0, 3.0, 7.0, 0.5, 0.25]).braid.node_count == 3408
+    assert plan.case([16.0, 20.0, 3.0, 7.0, 0.5, 0.25]).braid.node_count == 3408
+    example = Plan.from_toml(HOME / "examples" / "plan.toml")
+    assert example.ranges == plan.ranges and example.cases == 60
 
 
 def test_a_plan_is_what_its_text_says() -> None:

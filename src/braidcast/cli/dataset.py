@@ -23,7 +23,7 @@ app = typer.Typer(
 )
 
 
-@app.command(epilog="Example:  braidcast dataset create examples/plan.toml -o study")
+@app.command(epilog="Example:  braidcast dataset create examples/plan.toml -o sixty")
 def create(
     plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="The plan file.")],
     output: Annotated[
@@ -76,8 +76,8 @@ def _plan_report(folder: DatasetFolder) -> str:
     return "\n".join(f"{name:<16}{value}" for name, value in rows)
 
 
-app.command(epilog="Example:  braidcast dataset run study --workers 4")(run)
-app.command(epilog="Example:  braidcast dataset status study")(status)
-app.command(epilog="Example:  braidcast dataset collect study -o study.nc")(collect)
-app.command(epilog="Example:  braidcast dataset export study -o tables")(export)
+app.command(epilog="Example:  braidcast dataset run sixty --workers 4")(run)
+app.command(epilog="Example:  braidcast dataset status sixty")(status)
+app.command(epilog="Example:  braidcast dataset collect sixty -o sixty.nc")(collect)
+app.command(epilog="Example:  braidcast dataset export sixty -o tables")(export)
 app.command(epilog="Example:  braidcast dataset merge here there -o both")(merge)
