@@ -6,9 +6,13 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from braidcast.deployment.net import braid_net
+from braidcast.devices import catalogue
 from braidcast.errors import InputError
-from braidcast.mechanics.band_cholesky import NotPositiveDefinite
+from braidcast.mechanics import Joints, Problem
+from braidcast.mechanics.band_cholesky import BandCholesky, NotPositiveDefinite
 from braidcast.mechanics.linear_solvers import breadth_first_levels, solver
+from braidcast.mechanics.system import System
 from problems.nets import SOLVERS
 
 every_solver = pytest.mark.parametrize("key", SOLVERS)
@@ -103,6 +107,19 @@ def test_no_unknowns_at_all(key):
     empty = np.zeros(0, dtype=np.int64)
     factorise = solver(key, np.zeros(1, dtype=np.int64), empty, empty)
     assert factorise(np.zeros(0))(np.zeros(0)).shape == (0,)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_the_band_of_a_braid_is_hardly_wider_than_a_ring(mirrored):
+    braid = catalogue["paper"]
+    rings = np.array(braid.rings)
+    levels = rings.max() - rings if mirrored else rings
+    problem = Problem(braid_net(braid), joints=Joints(np.array(braid.crossings)), levels=levels)
+    system = System(problem)
+    band = BandCholesky(system.indptr, system.indices, system._dof_levels())
+    # 36 rings of 24 crossings are left, 9 unknowns each; neighbours are up to 26 crossings apart
+    assert len(band.order) == 36 * 24 * 9
+    assert 24 * 9 < band.height <= 27 * 9
 
 
 def test_not_finite_is_not_positive_definite():
