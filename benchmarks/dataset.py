@@ -22,6 +22,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 import braidcast
 from braidcast.dataset.folder import DatasetFolder
@@ -29,10 +30,10 @@ from braidcast.dataset.home import data_folder
 from braidcast.dataset.ledger import Ledger
 from braidcast.deployment.release import ReleaseOptions
 from braidcast.deployment.simulate import simulate
+from deployment import ONE_THREAD, cholesky_seconds
 
 STUDY = Path(__file__).parents[1] / "study" / "plan.toml"
 KILLS = 5
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 COMMAND = [sys.executable, "-m", "braidcast", "dataset"]
 
 Row = tuple[str, str, str, bool]
@@ -55,7 +56,7 @@ def timed_run(folder: Path, workers: int) -> dict[str, float]:
     if not kept.exists():
         begin = time.perf_counter()
         command = [*COMMAND, "run", str(folder), "--workers", str(workers)]
-        subprocess.run(command, check=True, env=os.environ | ONE_THREAD)
+        subprocess.run(command, check=True, env=os.environ | dict.fromkeys(ONE_THREAD, "1"))
         wall = time.perf_counter() - begin
         dataset = braidcast.open_dataset(folder)
         cpu = float(dataset.cpu_seconds.sum())
@@ -74,7 +75,9 @@ def killed_run(folder: Path, seconds: float, seed: int) -> tuple[int, int]:
     seen: dict[Path, tuple[int, int]] = {}
     for span in spans:
         command = [*COMMAND, "run", str(folder)]
-        run = subprocess.Popen(command, start_new_session=True, env=os.environ | ONE_THREAD)
+        run = subprocess.Popen(
+            command, start_new_session=True, env=os.environ | dict.fromkeys(ONE_THREAD, "1")
+        )
         time.sleep(float(span) + 8.0)  # what it takes to start anew
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
@@ -84,7 +87,9 @@ def killed_run(folder: Path, seconds: float, seed: int) -> tuple[int, int]:
         for record in finished:
             path = DatasetFolder.open(folder).case_file(record.index)
             seen.setdefault(path, (path.stat().st_ino, path.stat().st_mtime_ns))
-    subprocess.run([*COMMAND, "run", str(folder)], check=True, env=os.environ | ONE_THREAD)
+    subprocess.run(
+        [*COMMAND, "run", str(folder)], check=True, env=os.environ | dict.fromkeys(ONE_THREAD, "1")
+    )
     again = sum((p.stat().st_ino, p.stat().st_mtime_ns) != mark for p, mark in seen.items())
     return len(seen), again
 
@@ -105,18 +110,6 @@ def half_step(task: tuple[Path, int, Path]) -> tuple[float, float, str]:
     return mean, largest, outcome
 
 
-def reference() -> float:
-    """CPU seconds of numpy's Cholesky factorisation of a 3000 x 3000 matrix, one thread."""
-    matrix = np.random.default_rng(0).random((3000, 3000))
-    matrix = matrix @ matrix.T + 3000.0 * np.eye(3000)
-    seconds = []
-    for _ in range(7):
-        begin = time.process_time()
-        np.linalg.cholesky(matrix)
-        seconds.append(time.process_time() - begin)
-    return float(np.median(seconds))
-
-
 def hundred(home: Path, cases: int) -> list[Row]:
     """The run as it is: equilibrium, cost, overhead."""
     folder = planned("whole", cases, home)
@@ -125,7 +118,8 @@ def hundred(home: Path, cases: int) -> list[Row]:
     finished = int((dataset.status == "finished").sum())
     residual, deep = float(dataset.residual_relative.max()), float(dataset.max_penetration.max())
     median, slow = np.percentile(dataset.cpu_seconds.values, [50, 95])
-    ref = reference()
+    with threadpool_limits(1, "blas"):
+        ref = float(np.median(cholesky_seconds(7)))
     overhead = spent["wall"] * 2 / spent["cpu"]
     return [
         ("cases that converge", f"{finished} of {cases}", f"{cases}", finished == cases),

@@ -59,12 +59,10 @@ def main() -> int:
         return 0
     with CASES.open(newline="", encoding="utf-8") as file:
         expected = list(csv.reader(file))
-    same = sum(ours == theirs for ours, theirs in zip(found, expected, strict=False))
-    outcome = found[0].index("outcome")
-    labels = sum(
-        ours[: outcome + 1] == theirs[: outcome + 1]
-        for ours, theirs in zip(found, expected, strict=False)
-    )
+    pairs = list(zip(found, expected, strict=False))
+    label = found[0].index("outcome") + 1
+    same = sum(ours == theirs for ours, theirs in pairs)
+    labels = sum(ours[:label] == theirs[:label] for ours, theirs in pairs)
     total = len(expected) - 1
     print(
         f"cases of {total}: {same - 1} the same to the last bit, {labels - 1} of the same outcome"
