@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from braidcast import InputError, __version__
-from braidcast.dataset import atomic, folder
+from braidcast import InputError, __version__, atomic
+from braidcast.dataset import folder
 from braidcast.dataset.folder import STORE_VERSION, DatasetFolder
 from braidcast.dataset.plan import Plan
 

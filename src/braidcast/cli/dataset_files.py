@@ -55,8 +55,8 @@ def export(
     Exit codes: 0 done; 1 the file could not be written; 2 bad input; 130 interrupted.
     """
     with told():
+        from braidcast.atomic import write_atomically
         from braidcast.dataset import export as contents
-        from braidcast.dataset.atomic import write_atomically
         from braidcast.dataset.folder import DatasetFolder
         from braidcast.deployment.output import check_folder
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
-from braidcast.dataset.atomic import write_atomically
+from braidcast.atomic import write_atomically
 from braidcast.dataset.case_record import CaseRecord, Origin
 from braidcast.dataset.fields import ARRAYS, CENTRE, COSTS, NUMBERS, RESULTS, Field
 from braidcast.dataset.folder import STORE_VERSION

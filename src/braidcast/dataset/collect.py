@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from braidcast.dataset.atomic import write_atomically
+from braidcast.atomic import write_atomically
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.dataset.ledger import Ledger
 from braidcast.dataset.store import dataset

@@ -20,8 +20,8 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from braidcast import __version__
+from braidcast.atomic import TEMPORARY, write_atomically
 from braidcast.case import Case
-from braidcast.dataset.atomic import TEMPORARY, write_atomically
 from braidcast.dataset.draw import DrawProgress, discrepancies, draw
 from braidcast.dataset.plan import Plan
 from braidcast.deployment.output import check_folder

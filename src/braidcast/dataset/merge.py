@@ -6,7 +6,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from braidcast.dataset.atomic import TEMPORARY, write_atomically
+from braidcast.atomic import TEMPORARY, write_atomically
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.dataset.ledger import Ledger
 from braidcast.errors import InputError

@@ -13,8 +13,8 @@ from pathlib import Path
 from distributed import Client, Future, KilledWorker, as_completed
 from threadpoolctl import threadpool_limits
 
+from braidcast.atomic import TEMPORARY
 from braidcast.case import Case
-from braidcast.dataset.atomic import TEMPORARY
 from braidcast.dataset.case_record import code_versions
 from braidcast.dataset.cluster import RunStopped, connected
 from braidcast.dataset.folder import DatasetFolder

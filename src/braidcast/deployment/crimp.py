@@ -9,12 +9,14 @@ import hashlib
 import os
 from contextlib import suppress
 from dataclasses import astuple, replace
+from io import BytesIO
 from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
 from platformdirs import user_cache_path
 
+from braidcast.atomic import write_atomically
 from braidcast.deployment.net import braid_net
 from braidcast.devices import Braid
 from braidcast.errors import InputError
@@ -102,19 +104,12 @@ def crimped_state(
     if not result.converged:
         reason = f"crimping to {crimped_radius:.4g} mm failed: {result.reason}"
         raise CrimpingFailed(replace(result, reason=reason))
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    try:
+    content = BytesIO()
+    np.savez(content, positions=result.state.positions, rotations=result.state.rotations)
+    # a cache that cannot be written costs time, not the result
+    with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with open(temporary, "wb") as file:
-            np.savez(file, positions=result.state.positions, rotations=result.state.rotations)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError:
-        pass  # a cache that cannot be written costs time, not the result
-    finally:
-        with suppress(OSError):
-            temporary.unlink()
+        write_atomically(path, content.getvalue())
     return result.state
 
 

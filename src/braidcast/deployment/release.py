@@ -27,6 +27,8 @@ YIELDING = 0.0025
 HARDENING = 20.0
 """Largest factor by which the wall is then made stiffer at once."""
 
+USUAL_SHIFT = 6.4e-3
+"""Bent and crimped braids take at least this to make an indefinite tangent positive."""
 
 BALANCING = 60
 """Largest number of equilibria on the way to the one without drag."""
@@ -92,12 +94,13 @@ def release(
     newton_options = NewtonOptions(
         tolerance=options.tolerance * braid.wires * force,
         iterations=12,
-        relative=0.1,
+        relative=0.3,
         rises=1,
         largest_step=2.0 * options.move,
         largest_turn=0.6,
+        first_shift=USUAL_SHIFT,
     )
-    free = replace(newton_options, tolerance=80.0 * newton_options.tolerance)
+    free = replace(newton_options, tolerance=80.0 * newton_options.tolerance, relative=0.9)
     opening = RelaxationOptions(
         drag=drag,
         duration=options.duration * natural_time,
@@ -105,6 +108,7 @@ def release(
         largest_move=options.move,
         newton=newton_options,
         free=free,
+        held=40.0 * newton_options.tolerance,
     )
     motion = relax(_softened(system, YIELDING), positioned, opening, axial=axial, progress=progress)
     if not motion.completed:

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from braidcast.deployment.crimp import CrimpingFailed, crimped_state
 from braidcast.deployment.net import braid_net, wire_section
 from braidcast.deployment.outcome import outcome
 from braidcast.deployment.position import RingPath, position
-from braidcast.deployment.release import ReleaseOptions, release, wall
+from braidcast.deployment.release import USUAL_SHIFT, ReleaseOptions, release, wall
 from braidcast.deployment.result import Deployment
 from braidcast.devices import Braid
 from braidcast.mechanics import Equilibrium, Joints, NewtonOptions, Problem, State
@@ -60,13 +60,9 @@ def _simulate(
 ) -> Deployment:
     wall_clock, cpu_clock = time.perf_counter(), time.process_time()
     braid = case.braid
-    problem = Problem(
-        braid_net(braid),
-        joints=Joints(np.array(braid.crossings)),
-        contacts=(wall(braid, case.vessel_geometry, case.wall.friction),),
-        levels=np.array(braid.rings),
+    system = _analysed(braid, linear_solver).with_contacts(
+        (wall(braid, case.vessel_geometry, case.wall.friction),)
     )
-    system = System(problem, linear_solver)
     frames = [("free", np.array(braid.positions))]
     system, last, iterations = _stages(
         case, system, options, progress or _no_progress, cache, frames
@@ -83,6 +79,15 @@ def _simulate(
         reached.get("crimp", last.state.positions),
         (time.perf_counter() - wall_clock, time.process_time() - cpu_clock),
     )
+
+
+@lru_cache(maxsize=2)
+def _analysed(braid: Braid, linear_solver: str) -> System:
+    """The braid without walls; kept, for it is the same in all cases of a device."""
+    problem = Problem(
+        braid_net(braid), joints=Joints(np.array(braid.crossings)), levels=np.array(braid.rings)
+    )
+    return System(problem, linear_solver)
 
 
 def _no_progress(stage: str, fraction: float) -> None:
@@ -142,7 +147,9 @@ def _position(
     progress: Callable[[float], None],
 ) -> tuple[Equilibrium, int]:
     bending = wire_section(braid).EIy
-    options = NewtonOptions(tolerance=3.0 * bending / braid.axis_radius**2, largest_step=0.3)
+    options = NewtonOptions(
+        tolerance=3.0 * bending / braid.axis_radius**2, largest_step=0.3, first_shift=USUAL_SHIFT
+    )
     stiffness = 0.1 * bending / braid.segment_length**3
     free = system.with_contacts(())
     return position(free, crimped, np.array(braid.rings), path, stiffness, options, progress)

@@ -95,22 +95,20 @@ class BandCholesky:
 
         Raises NotPositiveDefinite.
         """
+        half = _gather(data, self.entries)
+        if not _eliminate(half, self.member_at, self.neighbour_at, self.entry_at):
+            raise NotPositiveDefinite
         size = len(self.order)
         flat = np.zeros(size * self.height)
         flat[self.direct_to] = data[self.direct_from]
-        half = np.empty(len(self.entries))
-        ok = _eliminate(
-            data,
+        _subtract_products(
+            half,
             self.member_at,
             self.neighbour_places,
             self.neighbour_at,
             self.entry_at,
-            self.entries,
-            half,
             flat.reshape((size, self.height)),
         )
-        if not ok:
-            raise NotPositiveDefinite
         band = flat.reshape((self.height, size), order="F")
         if size:
             band, info = dpbtrf(band, lower=1, overwrite_ab=1)
@@ -197,23 +195,12 @@ def _count_up(lengths: IntArray) -> IntArray:
 
 @nb.njit(cache=True)
 def _eliminate(
-    data: Array,
-    member_at: IntArray,
-    places: IntArray,
-    neighbour_at: IntArray,
-    entry_at: IntArray,
-    entries: IntArray,
-    half: Array,
-    band: Array,
+    half: Array, member_at: IntArray, neighbour_at: IntArray, entry_at: IntArray
 ) -> bool:
-    """Per group: L L^T = K_oo, W = L^-1 K_oe into ``half`` (L, then W), and -W^T W into ``band``.
+    """Per group, L L^T = K_oo and W = L^-1 K_oe in place of the entries in ``half``.
 
-    ``places`` of a group's neighbours ascend; ``band`` is by columns. Inner loops run over whole
-    rows, so that the compiler works on several entries at once.
+    Inner loops run over whole rows, so that the compiler works on several entries at once.
     """
-    sums = np.empty(band.shape[1])
-    for i in range(len(entries)):
-        half[i] = data[entries[i]] if entries[i] >= 0 else 0.0
     for g in range(len(member_at) - 1):
         m = member_at[g + 1] - member_at[g]
         n = neighbour_at[g + 1] - neighbour_at[g]
@@ -237,17 +224,44 @@ def _eliminate(
             scale = 1.0 / factor[i, i]
             for j in range(n):
                 w[i, j] *= scale
-        place = places[neighbour_at[g] : neighbour_at[g + 1]]
+    return True
+
+
+@nb.njit(cache=True)
+def _subtract_products(
+    half: Array,
+    member_at: IntArray,
+    places: IntArray,
+    neighbour_at: IntArray,
+    entry_at: IntArray,
+    band: Array,
+) -> None:
+    """Per group, -W^T W into ``band``, by columns; ``places`` of its neighbours ascend."""
+    product = np.empty((band.shape[1], band.shape[1]))
+    for g in range(len(member_at) - 1):
+        m = member_at[g + 1] - member_at[g]
+        n = neighbour_at[g + 1] - neighbour_at[g]
+        _, w = _blocks(half[entry_at[g] : entry_at[g + 1]], m, n)
         for i in range(n):
             for j in range(n):
-                sums[j] = 0.0
+                product[i, j] = 0.0
             for k in range(m):
                 v = w[k, i]
                 for j in range(n):
-                    sums[j] += v * w[k, j]
+                    product[i, j] += v * w[k, j]
+        place = places[neighbour_at[g] : neighbour_at[g + 1]]
+        for i in range(n):
             for j in range(i, n):
-                band[place[i], place[j] - place[i]] -= sums[j]
-    return True
+                band[place[i], place[j] - place[i]] -= product[i, j]
+
+
+@nb.njit(cache=True)
+def _gather(data: Array, entries: IntArray) -> Array:
+    """The entries of the groups' blocks; 0 where the pattern has none."""
+    out = np.empty(len(entries))
+    for i in range(len(entries)):
+        out[i] = data[entries[i]] if entries[i] >= 0 else 0.0
+    return out
 
 
 @nb.njit(cache=True, inline="always")

@@ -303,56 +303,93 @@ def _to_elements(
     tangents: Array,
     with_tangent: bool,
 ) -> None:
-    """Carry point forces and tangents to the twelve freedoms of their elements."""
+    """Carry point forces and tangents to the twelve freedoms of their elements.
+
+    First to x1, L t1, x2, L t2, in which the points are linear; then to the spins, which turn
+    these by d(L t) = C w with C = L [t]^T.
+    """
     count = shape.shape[0]
-    b = np.zeros((3, 12))
-    db = np.empty((3, 12))
-    t = np.empty((2, 3))
+    f = np.empty((4, 3))
+    k = np.empty((4, 4, 3, 3))
+    arm = np.empty(3)
+    turn = np.zeros((2, 3, 3))
     for n in range(elements.shape[0]):
-        for q in range(count):
-            p = n * count + q
-            if gap[p] >= threshold:
-                continue
-            for s in range(2):
-                node = elements[n, s]
-                arm = shape[q, 2 * s + 1] * lengths[n]
-                for i in range(3):
-                    t[s, i] = 0.0
-                    for j in range(3):
-                        t[s, i] += rotations[node, i, j] * ends[n, s, j]
-                    b[i, 6 * s + i] = shape[q, 2 * s]
-                # dx = arm w x t = -arm [t] w
-                b[0, 6 * s + 4] = arm * t[s, 2]
-                b[0, 6 * s + 5] = -arm * t[s, 1]
-                b[1, 6 * s + 3] = -arm * t[s, 2]
-                b[1, 6 * s + 5] = arm * t[s, 0]
-                b[2, 6 * s + 3] = arm * t[s, 1]
-                b[2, 6 * s + 4] = -arm * t[s, 0]
-            for j in range(12):
-                forces[n, j] += (
-                    b[0, j] * force[p, 0] + b[1, j] * force[p, 1] + b[2, j] * force[p, 2]
-                )
-            if not with_tangent:
-                continue
+        first, last = n * count, (n + 1) * count
+        if gap[first:last].min() >= threshold:
+            continue
+        _to_cubic(shape, force[first:last], tangent[first:last], f, k, with_tangent)
+        for s in range(2):
+            c = 2 * s + 1
             for i in range(3):
-                for j in range(12):
-                    db[i, j] = (
-                        tangent[p, i, 0] * b[0, j]
-                        + tangent[p, i, 1] * b[1, j]
-                        + tangent[p, i, 2] * b[2, j]
-                    )
-            for i in range(12):
-                for j in range(12):
-                    tangents[n, i, j] += (
-                        b[0, i] * db[0, j] + b[1, i] * db[1, j] + b[2, i] * db[2, j]
-                    )
-            for s in range(2):
-                arm = shape[q, 2 * s + 1] * lengths[n]
-                along = 0.0
+                arm[i] = 0.0
+                for j in range(3):
+                    arm[i] += lengths[n] * rotations[elements[n, s], i, j] * ends[n, s, j]
+            turn[s, 0, 1], turn[s, 1, 0] = arm[2], -arm[2]
+            turn[s, 1, 2], turn[s, 2, 1] = arm[0], -arm[0]
+            turn[s, 2, 0], turn[s, 0, 2] = arm[1], -arm[1]
+            along = arm[0] * f[c, 0] + arm[1] * f[c, 1] + arm[2] * f[c, 2]
+            for i in range(3):
+                forces[n, 6 * s + i] += f[2 * s, i]
+                for j in range(3):
+                    forces[n, 6 * s + 3 + i] += turn[s, j, i] * f[c, j]
+            if with_tangent:
+                for b in range(4):
+                    _turn_rows(turn[s], k[c, b])
+                for a in range(4):
+                    _turn_columns(turn[s], k[a, c])
                 for i in range(3):
-                    along += force[p, i] * t[s, i]
+                    k[c, c, i, i] -= along
+                    for j in range(3):
+                        k[c, c, i, j] += 0.5 * (f[c, i] * arm[j] + f[c, j] * arm[i])
+        if with_tangent:
+            for a in range(4):
+                for i in range(3):
+                    for b in range(4):
+                        for j in range(3):
+                            tangents[n, 3 * a + i, 3 * b + j] += k[a, b, i, j]
+
+
+@nb.njit(cache=True, inline="always")
+def _to_cubic(
+    shape: Array, force: Array, tangent: Array, f: Array, k: Array, with_tangent: bool
+) -> None:
+    """Force (4, 3) and tangent (4, 4, 3, 3) on the coefficients of an element's cubic."""
+    for a in range(4):
+        for i in range(3):
+            f[a, i] = 0.0
+            for q in range(shape.shape[0]):
+                f[a, i] += shape[q, a] * force[q, i]
+        if not with_tangent:
+            continue
+        for b in range(a + 1):
+            for i in range(3):
+                for j in range(3):
+                    k[a, b, i, j] = 0.0
+            for q in range(shape.shape[0]):
+                weight = shape[q, a] * shape[q, b]
                 for i in range(3):
                     for j in range(3):
-                        v = 0.5 * arm * (force[p, i] * t[s, j] + force[p, j] * t[s, i])
-                        tangents[n, 6 * s + 3 + i, 6 * s + 3 + j] += v
-                    tangents[n, 6 * s + 3 + i, 6 * s + 3 + i] -= arm * along
+                        k[a, b, i, j] += weight * tangent[q, i, j]
+            for i in range(3):
+                for j in range(3):
+                    k[b, a, i, j] = k[a, b, i, j]
+
+
+@nb.njit(cache=True, inline="always")
+def _turn_rows(turn: Array, block: Array) -> None:
+    """``block = turn^T block``, ``turn`` antisymmetric."""
+    for j in range(3):
+        x, y, z = block[0, j], block[1, j], block[2, j]
+        block[0, j] = turn[1, 0] * y + turn[2, 0] * z
+        block[1, j] = turn[0, 1] * x + turn[2, 1] * z
+        block[2, j] = turn[0, 2] * x + turn[1, 2] * y
+
+
+@nb.njit(cache=True, inline="always")
+def _turn_columns(turn: Array, block: Array) -> None:
+    """``block = block turn``, ``turn`` antisymmetric."""
+    for i in range(3):
+        x, y, z = block[i, 0], block[i, 1], block[i, 2]
+        block[i, 0] = y * turn[1, 0] + z * turn[2, 0]
+        block[i, 1] = x * turn[0, 1] + z * turn[2, 1]
+        block[i, 2] = x * turn[0, 2] + y * turn[1, 2]

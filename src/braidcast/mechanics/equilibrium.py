@@ -22,7 +22,7 @@ from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import Evaluation, Springs, System, moved
 
 SMALLEST_SHIFT = 1e-4
-"""First raise of an indefinite tangent's diagonal, in units of the bending stiffness."""
+"""Least raise of an indefinite tangent's diagonal, in units of the bending stiffness."""
 
 PATIENCE = 3
 """Iterations in which a residual may rise: the first step stretches the wires, the next mend it."""
@@ -38,7 +38,8 @@ class NewtonOptions:
     length), N, or what rounding leaves where that is more, or ``relative`` times the sum before
     the first step; ``largest_step`` mm and
     ``largest_turn`` rad a node and iteration. More than ``rises`` times in a row, after the first
-    ``PATIENCE`` iterations, the unbalanced force may not rise.
+    ``PATIENCE`` iterations, the unbalanced force may not rise. ``first_shift`` is by how much the
+    diagonal of an indefinite tangent is raised first, in units of the bending stiffness.
     """
 
     tolerance: float = 1e-8
@@ -47,6 +48,7 @@ class NewtonOptions:
     largest_step: float = np.inf
     largest_turn: float = 1.0
     rises: int = 30
+    first_shift: float = SMALLEST_SHIFT
 
 
 @dataclass(frozen=True)
@@ -86,11 +88,14 @@ def rounding_floor(system: System) -> float:
     return float(4.0 * np.finfo(float).eps * np.abs(net.nodes).max() * stiffness)
 
 
-def factorise(system: System, evaluation: Evaluation, shift: float) -> tuple[Solve, float]:
+def factorise(
+    system: System, evaluation: Evaluation, shift: float, first_shift: float = SMALLEST_SHIFT
+) -> tuple[Solve, float]:
     """Factor of the tangent, its diagonal raised by as much as it takes to make it positive.
 
     ``shift`` is what the last tangent took, in units of the bending stiffness of an element; a
-    part of it is tried first. Returns the solution operator and the shift used.
+    part of it is tried first, then ``first_shift`` and more. Returns the solution operator and the
+    shift used.
     """
     shift = shift / 32.0 if shift > 32.0 * SMALLEST_SHIFT else 0.0
     for _ in range(30):
@@ -101,7 +106,7 @@ def factorise(system: System, evaluation: Evaluation, shift: float) -> tuple[Sol
         try:
             return system.linear_solver(data), shift
         except NotPositiveDefinite:
-            shift = max(8.0 * shift, SMALLEST_SHIFT)
+            shift = max(8.0 * shift, first_shift)
     raise NotPositiveDefinite
 
 
@@ -150,7 +155,7 @@ def newton(
             reason = f"the unbalanced force kept rising, to {residual:.3g} N"
             break
         try:
-            solve, shift = factorise(system, evaluation, shift)
+            solve, shift = factorise(system, evaluation, shift, options.first_shift)
         except NotPositiveDefinite:
             reason = "the tangent stayed indefinite"
             break

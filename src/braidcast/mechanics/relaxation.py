@@ -20,9 +20,6 @@ from braidcast.mechanics.equilibrium import (
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import Springs, System
 
-HELD = 40.0
-"""Unbalanced forces, in tolerances of a step, that friction may hold."""
-
 
 @dataclass(frozen=True)
 class RelaxationOptions:
@@ -32,7 +29,8 @@ class RelaxationOptions:
     touches a wall; ``growth`` how much longer
     a step may be than the last. A step whose equilibrium is not found is shortened. ``newton``
     says how exactly a step is solved, ``free`` how exactly while nothing touches a wall: what is
-    unbalanced then is stretch of the wires, and the next step takes it out.
+    unbalanced then is stretch of the wires, and the next step takes it out. ``held`` N is how much
+    unbalanced force friction may hold at the end.
     """
 
     drag: float
@@ -41,6 +39,7 @@ class RelaxationOptions:
     largest_move: float
     newton: NewtonOptions
     free: NewtonOptions
+    held: float
     growth: float = 2.0
     shortest_step: float = 1e-6
 
@@ -68,8 +67,8 @@ def relax(
 ) -> Relaxation:
     """Let go of a net at ``start`` and follow it for the duration, or until friction holds it.
 
-    Friction holds where less than ``HELD`` tolerances are unbalanced and a step, meant to bring
-    that down, only makes points stick and slip in turn.
+    Friction holds where less than ``held`` is unbalanced and a step, meant to bring that down, only
+    makes points stick and slip in turn.
     """
     last: Equilibrium | None = None
     touching = False
@@ -98,7 +97,7 @@ def relax(
         far = options.largest_move if touching else 2.0 * options.largest_move
         move = float(np.linalg.norm(attempt.state.positions - state.positions, axis=1).max())
         if last is not None and not attempt.converged:
-            if attempt.residuals[0] <= HELD * options.newton.tolerance:
+            if attempt.residuals[0] <= options.held:
                 return Relaxation(last, True, "held by friction", steps, iterations, tuple(path))
         if not attempt.converged or move > 2.0 * far:
             if step <= options.shortest_step * options.duration:

@@ -77,8 +77,9 @@ class System:
         )
 
     def with_contacts(self, contacts: tuple[Contact, ...]) -> "System":
-        """The same system against other walls; the analysed pattern is shared."""
+        """The same system against other walls; the analysed pattern is shared, work arrays not."""
         other = copy(self)
+        other.forces, other.tangents = np.zeros_like(self.forces), np.zeros_like(self.tangents)
         other.problem = replace(self.problem, contacts=contacts)
         other.contacts = [BeamContact(self.problem.net, contact) for contact in contacts]
         return other

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 import os
-import uuid
 from pathlib import Path
 
 import manifold3d
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from braidcast.atomic import write_atomically
 from braidcast.errors import InputError
 from braidcast.vessels.parametric import SaccularVessel, Tube
 
@@ -98,19 +98,6 @@ def write_stl(path: str | os.PathLike[str], vertices: ArrayLike, triangles: Arra
     records["normal"] = np.divide(normals, size, out=np.zeros_like(normals), where=size > 0.0)
     records["corners"] = corners
     header = b"braidcast lumen surface, mm".ljust(80)
-    _write_whole(
+    write_atomically(
         Path(path), header + np.array(len(records), dtype="<u4").tobytes() + records.tobytes()
     )
-
-
-def _write_whole(path: Path, content: bytes) -> None:
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-    try:
-        with temporary.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
