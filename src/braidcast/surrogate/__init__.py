@@ -1,0 +1,1 @@
+"""The surrogate: the deployed braid from the case alone, learned from simulations."""

@@ -1,0 +1,75 @@
+"""The braid as geometry alone places it: rings across the centreline, wires at the wall.
+
+Elements keep their length, so that on a cylinder of the lumen's radius a braid has one length
+(``Braid.crimped_length``); its middle stays where the middle of the crimped braid was. No sac, no
+bending, no friction: what the simulation does beyond this is what is learned, in the vessel's own
+axes, and it is one of the null models every surrogate must beat.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from braidcast.case import Case
+
+Array = NDArray[np.float64]
+
+Z_AXIS = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class PlacedBraid:
+    """``positions`` (N, 3) mm and the ``axes`` (rings, 3, 3) of each ring as columns.
+
+    Of the axes the third lies along the vessel; the first two are those of the free braid, turned
+    into the start of the vessel and on along it without twisting about it.
+    """
+
+    positions: Array
+    axes: Array
+    rings: NDArray[np.int64]
+
+    def departure(self, positions: Array) -> Array:
+        """How far nodes (N, 3) lie from their places, in the axes of their rings, (N, 3) mm."""
+        return np.einsum("nji,nj->ni", self.axes[self.rings], positions - self.positions)
+
+    def moved(self, departure: Array) -> Array:
+        """Nodes (N, 3) mm that lie so far from their places."""
+        return self.positions + self.turned(departure)
+
+    def turned(self, vectors: Array) -> Array:
+        """Vectors (N, 3), given in the axes of the nodes' rings, in those of space."""
+        return np.einsum("nij,nj->ni", self.axes[self.rings], vectors)
+
+
+def placed_braid(case: Case) -> PlacedBraid:
+    """The geometrically placed braid of a case."""
+    braid = case.braid
+    radius = min(case.vessel_radius - braid.wire_radius, braid.axis_radius)
+    length = braid.crimped_length(radius)
+    middle = case.start_arc_length + 0.5 * case.crimped_length
+    places = middle + length * np.linspace(-0.5, 0.5, braid.segments + 1)
+    centres, tangents = (
+        case.centreline.at_arc_length(places),
+        case.centreline.tangent_at_arc_length(places),
+    )
+    first = case.centreline.tangent_at_arc_length([0.0])
+    axes = _smallest_turns(first[0], tangents) @ _smallest_turns(Z_AXIS, first)
+    across = braid.positions_on_cylinder(radius, 0.0)
+    rings = np.array(braid.rings)
+    positions = centres[rings] + np.einsum("nij,nj->ni", axes[rings], across)
+    return PlacedBraid(positions, axes, rings)
+
+
+def _smallest_turns(start: Array, ends: Array) -> Array:
+    """Smallest turns (n, 3, 3) of a unit vector (3,) into others (n, 3).
+
+    R = c I + [v] + v vᵀ/(1 + c),  v = start × end,  c = start · end; half a turn goes about x.
+    """
+    v, c = np.cross(start, ends), ends @ start
+    share = np.divide(1.0, 1.0 + c, out=np.zeros_like(c), where=c > -1.0 + 1e-12)
+    turns = c[:, None, None] * np.eye(3) + share[:, None, None] * v[:, :, None] * v[:, None, :]
+    turns += np.cross(np.eye(3), v[:, None, :])
+    turns[c <= -1.0 + 1e-12] = np.diag([1.0, -1.0, -1.0])
+    return turns
