@@ -1,0 +1,81 @@
+"""What a surrogate is told of a case: numbers computed from the case alone (paper, section 2.3).
+
+The paper has two sets, the parameters of the vessel μ_B and points of the positioned centreline
+μ_cl. Ours, ``site_predictors``, says where the stent lies to the neck and how wide and bent things
+are there: quantities of which the deployed shape is a smoother function.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from braidcast.case import Case
+from braidcast.errors import InputError
+
+Array = NDArray[np.float64]
+
+BEZIER = ("vessel_P1_y", "vessel_P1_z", "vessel_diameter", "aneurysm_diameter", "y_Ca", "site_eta")
+"""Names of μ_B, mm; η is a number."""
+
+SITE = ("middle", "lean", "bend", "lumen_radius", "neck_radius", "protrusion", "sac_radius")
+"""Names of ours, mm; the protrusion is a number."""
+
+SITE_MIRROR = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+"""What happens to ours when vessel and stent are seen from the other end."""
+
+
+def bezier_predictors(case: Case) -> Array:
+    """The paper's μ_B (6,), named by ``BEZIER``."""
+    centre, radius = _sac(case)
+    _, y, z = case.vessel.P1
+    diameter = 2.0 * case.vessel_radius
+    return np.array([y, z, diameter, 2.0 * radius, centre[1], case.site.eta])
+
+
+def centreline_predictors(case: Case, points: int) -> Array:
+    """The paper's μ_cl (2 N_cl + 3,): y and z of points on C_T, then D_v, D_a, y_Ca; mm.
+
+    The ``points`` N_cl, 2 or more, are spread evenly over the positioned centreline C_T of the
+    crimped stent, both ends among them; x is 0 for all of them.
+    """
+    if points < 2:
+        raise InputError(f"N_cl = {points} must be 2 or more")
+    centre, radius = _sac(case)
+    places = case.start_arc_length + case.crimped_length * np.linspace(0.0, 1.0, points)
+    along = case.centreline.at_arc_length(places)[:, 1:].ravel()
+    return np.concatenate([along, [2.0 * case.vessel_radius, 2.0 * radius, centre[1]]])
+
+
+def site_predictors(case: Case) -> Array:
+    """Ours (7,), named by ``SITE``.
+
+    ``middle``: arc length from the place below the sac's centre to the middle of the stent;
+    ``lean`` and ``bend``: P1 along and across the line from P0 to P2, from its middle;
+    ``neck_radius``: of the circle in which the sac meets a flat wall; ``protrusion``: height of the
+    sac's centre above the wall over its radius.
+    """
+    centre, radius = _sac(case)
+    line = case.centreline
+    away, below = line.closest(centre)
+    chord = line.P2 - line.P0
+    chord = chord / np.linalg.norm(chord)
+    arm = line.P1 - 0.5 * (line.P0 + line.P2)
+    lean = float(arm @ chord)
+    height = float(away[0]) - case.vessel_radius
+    return np.array(
+        [
+            case.start_arc_length + 0.5 * case.crimped_length - float(below[0]),
+            lean,
+            float(np.linalg.norm(arm - lean * chord)),
+            case.vessel_radius,
+            np.sqrt(max(radius * radius - height * height, 0.0)),
+            height / radius,
+            radius,
+        ]
+    )
+
+
+def _sac(case: Case) -> tuple[Array, float]:
+    """Centre (3,) and radius of the sac, mm."""
+    if case.aneurysm is None or case.aneurysm_centre is None:
+        raise InputError("aneurysm is missing; the surrogate needs one")
+    return np.asarray(case.aneurysm_centre), 0.5 * case.aneurysm.diameter
