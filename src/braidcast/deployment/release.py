@@ -136,13 +136,15 @@ def _harden(
 ) -> tuple[System, Equilibrium, int]:
     """Stiffen the wall step by step against a ``drag`` (N,) N/mm; shorter steps where one fails.
 
+    Where the shortest fails too, all is tried again with ``MOST_DRAG`` times the drag.
+
     Beyond full stiffness it goes on, for coarse braids, until no wire is deeper in the wall than
     the threshold of its contact. Returns the stiff system, the equilibrium or the last attempt,
     and all Newton iterations.
     """
     options = replace(options, iterations=15, relative=0.01)
     threshold = system.problem.contacts[0].threshold
-    last, share, factor, iterations = start, YIELDING, HARDENING, 0
+    last, share, factor, much, iterations = start, YIELDING, HARDENING, 1.0, 0
     while True:
         target = share * factor if share >= 1.0 else min(1.0, share * factor)
         stiffer = _softened(system, target)
@@ -151,7 +153,7 @@ def _harden(
             last.state,
             options,
             axial=last.axial,
-            springs=Springs(drag, last.state.positions),
+            springs=Springs(much * drag, last.state.positions),
             memories=last.memories,
         )
         iterations += attempt.iterations
@@ -161,6 +163,8 @@ def _harden(
                 return stiffer, last, iterations
         elif factor > 1.05:
             factor = np.sqrt(factor)
+        elif much < MOST_DRAG:
+            factor, much = HARDENING, MOST_DRAG
         else:
             reason = f"the wall could not be stiffened beyond {share:.3g}: {attempt.reason}"
             return stiffer, replace(attempt, reason=reason), iterations
