@@ -45,11 +45,11 @@ def test_the_example_is_the_study() -> None:
     plan = Plan.from_toml(HOME / "study" / "plan.toml")
     assert (plan.cases, plan.subsets, plan.tests) == (900, (150, 300, 600), 100)
     assert [(p.column, p.low, p.high) for p in plan.ranges] == [
-        ("vessel_P1_y_mm", 12.0, 30.0),
+        ("vessel_P1_y_mm", 10.0, 30.0),
         ("vessel_P1_z_mm", 18.0, 32.0),
         ("vessel_diameter_mm", 2.0, 4.0),
         ("aneurysm_diameter_mm", 5.0, 10.0),
-        ("aneurysm_protrusion", 0.3, 0.6),
+        ("aneurysm_protrusion", 0.3, 0.75),
         ("site_eta", 0.0, 1.0),
     ]
     assert plan.case([16.0, 20.0, 3.0, 7.0, 0.5, 0.25]).braid.node_count == 3408

@@ -158,3 +158,21 @@ def test_rounding_of_the_crimped_state_does_not_grow(
     assert again.converged
     apart = np.linalg.norm(again.positions - end_in_sac.positions, axis=1)
     assert 0.0 < apart.max() < 1e-3
+
+
+def test_a_wire_on_the_edge_of_the_neck_is_pressed_out_of_the_wall() -> None:
+    """Case 693 of the study: no small factor stiffens its wall, more drag does."""
+    case = Case.from_dict(
+        {
+            "vessel": {
+                "P1": [0.0, 26.423963945266046, 24.97380085527137],
+                "diameter": 2.5137900613670254,
+            },
+            "aneurysm": {"diameter": 5.429170971602844, "protrusion": 0.37751815684603485},
+            "site": {"eta": 0.16904836558908948},
+        }
+    )
+    deployment = simulate(case)
+    assert deployment.converged, deployment.reason
+    assert deployment.max_penetration_mm <= case.braid.wire_radius / 4.0
+    assert deployment.residual_relative <= 1e-4

@@ -114,42 +114,46 @@ def release(
     if not motion.completed:
         last = replace(motion.last, converged=False, reason=motion.reason)
         return Release(system, last, motion.iterations, motion.path)
-    stiffness = np.full(len(positioned.positions), drag / (0.6 * natural_time))
-    stiff, last, iterations = _harden(system, motion.last, stiffness, newton_options)
-    iterations += motion.iterations
-    if last.converged:
+    braked = np.full(len(positioned.positions), drag / (0.6 * natural_time))
+    last, share, iterations = motion.last, YIELDING, motion.iterations
+    while True:
+        share, last, spent = _harden(system, last, share, braked, newton_options)
+        stiff = _softened(system, share)
+        iterations += spent
+        if not last.converged:
+            break
         total = sum(contact.total for contact in last.evaluation.contacts)
         final = replace(
             newton_options, iterations=8, relative=0.0, tolerance=options.balance * total
         )
-        if system.problem.contacts[0].friction > 0.0:
-            last, spent = _balance(stiff, last, stiffness, final)
-        else:
+        if system.problem.contacts[0].friction == 0.0:
             settling = replace(opening, first_step=natural_time, newton=final)
             last, spent = _settle(stiff, last, settling)
+        else:
+            last, spent = _balance(stiff, last, braked, final)
         iterations += spent
+        if not last.converged or _out_of_the_wall(last, system):
+            break
     return Release(stiff, last, iterations, motion.path)
 
 
 def _harden(
-    system: System, start: Equilibrium, drag: Array, options: NewtonOptions
-) -> tuple[System, Equilibrium, int]:
+    system: System, start: Equilibrium, share: float, drag: Array, options: NewtonOptions
+) -> tuple[float, Equilibrium, int]:
     """Stiffen the wall step by step against a ``drag`` (N,) N/mm; shorter steps where one fails.
 
     Where the shortest fails too, all is tried again with ``MOST_DRAG`` times the drag.
 
-    Beyond full stiffness it goes on, for coarse braids, until no wire is deeper in the wall than
-    the threshold of its contact. Returns the stiff system, the equilibrium or the last attempt,
-    and all Newton iterations.
+    Beyond full stiffness it goes on until no wire is deeper in the wall than the threshold of its
+    contact. From ``share`` of the full stiffness on; returns the share reached, the equilibrium
+    or the last attempt, and all Newton iterations.
     """
     options = replace(options, iterations=15, relative=0.01)
-    threshold = system.problem.contacts[0].threshold
-    last, share, factor, much, iterations = start, YIELDING, HARDENING, 1.0, 0
+    last, factor, much, iterations = start, HARDENING, 1.0, 0
     while True:
         target = share * factor if share >= 1.0 else min(1.0, share * factor)
-        stiffer = _softened(system, target)
         attempt = newton(
-            stiffer,
+            _softened(system, target),
             last.state,
             options,
             axial=last.axial,
@@ -159,15 +163,21 @@ def _harden(
         iterations += attempt.iterations
         if attempt.converged:
             last, share = attempt, target
-            if share >= 1.0 and last.evaluation.contacts[0].penetration <= threshold:
-                return stiffer, last, iterations
+            if share >= 1.0 and _out_of_the_wall(last, system):
+                return share, last, iterations
         elif factor > 1.05:
             factor = np.sqrt(factor)
         elif much < MOST_DRAG:
             factor, much = HARDENING, MOST_DRAG
         else:
             reason = f"the wall could not be stiffened beyond {share:.3g}: {attempt.reason}"
-            return stiffer, replace(attempt, reason=reason), iterations
+            return share, replace(attempt, reason=reason), iterations
+
+
+def _out_of_the_wall(equilibrium: Equilibrium, system: System) -> bool:
+    """Whether no wire lies deeper in the wall than the threshold of its contact."""
+    depth = equilibrium.evaluation.contacts[0].penetration
+    return depth <= system.problem.contacts[0].threshold
 
 
 def _balance(
