@@ -1,6 +1,6 @@
 """Simulate the study, or what of it is missing, and compare it with cases.csv beside this file.
 
-    python study/rebuild.py            # some 35 minutes on two cores; end it and start it as you like
+    python study/rebuild.py            # 35 minutes on two cores; end and start it as you like
     python study/rebuild.py --write    # take what was found as the new cases.csv
 
 The dataset goes to ``study`` in BRAIDCAST_DATA, by default in the user's cache folder.
