@@ -22,7 +22,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Kernel, Matern, WhiteKernel
@@ -62,14 +62,13 @@ class GaussianProcesses:
 
     def predict(self, points: Array) -> Array:
         """Means (m, L) at points (m, p)."""
-        covariance = self._covariance(np.atleast_2d(points))
-        return self.offset + np.einsum("mnl,nl->ml", covariance, self._weights)
+        return self._mean(self._covariance(np.atleast_2d(points)))
 
     def predict_with_std(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations (m, L) at points (m, p), noise included."""
         points = np.atleast_2d(points)
         covariance = self._covariance(points)
-        mean = self.offset + np.einsum("mnl,nl->ml", covariance, self._weights)
+        mean = self._mean(covariance)
         prior = self.signal + self.noise
         if self.parity.any():
             prior = prior + self.signal * self.parity * self._mirrored(points)
@@ -78,6 +77,9 @@ class GaussianProcesses:
             half = solve_triangular(factor, covariance[:, :, output].T, lower=True)
             variance[:, output] = prior[..., output] - (half * half).sum(axis=0)
         return mean, np.sqrt(np.maximum(variance, 0.0))
+
+    def _mean(self, covariance: Array) -> Array:
+        return self.offset + np.einsum("mnl,nl->ml", covariance, self._weights)
 
     @cached_property
     def _factors(self) -> list[Array]:
@@ -88,7 +90,7 @@ class GaussianProcesses:
         for output in range(len(self.signal)):
             own = np.array(covariance[:, :, output])
             own[diagonal, diagonal] += self.noise[output] + JITTER * self.signal[output]
-            factors.append(np.tril(cho_factor(own, lower=True)[0]))
+            factors.append(cholesky(own, lower=True))
         return factors
 
     @cached_property
