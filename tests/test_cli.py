@@ -197,7 +197,7 @@ def test_an_interrupt_leaves_nothing(
     if where == "simulate":
         stand_in(monkeypatch, interrupt)
     else:
-        monkeypatch.setattr(output, "_write_summary", interrupt)
+        monkeypatch.setattr(output, "write_summary", interrupt)
     assert run("simulate", case_file) == 130
     assert capsys.readouterr().err.endswith("braidcast: interrupted\n")
     assert list(case_file.parent.iterdir()) == [case_file]

@@ -11,13 +11,15 @@ import xml.etree.ElementTree as ET
 from base64 import b64decode
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 
-from braidcast import Deployment, InputError, __version__, write_deployment
-from braidcast.deployment import output, picture
+from braidcast import Deployment, InputError, __version__, results_folder, write_deployment
+from braidcast.deployment import drawing, output, picture
+from braidcast.results_folder import check_folder
 
 SUMMARY_KEYS = {
     *("outcome", "deployed_length_mm", "free_length_mm", "foreshortening_percent"),
@@ -114,7 +116,7 @@ def test_the_picture_shows_something(deployment: Deployment, tmp_path: Path) -> 
         assert "OpenGL" in written.notes[0]
         pytest.skip(written.notes[0])
     with Image.open(tmp_path / "deployed.png") as image:
-        assert image.size == picture.SIZE
+        assert image.size == drawing.SIZE
         pixels = np.asarray(image.convert("RGB"), dtype=int)
     assert 0.02 < np.mean(pixels.min(axis=-1) < 120) < 0.6, "wires"
     assert 0.1 < np.mean(np.abs(pixels - 255).sum(axis=-1) > 30) < 0.9, "vessel and wires"
@@ -169,11 +171,11 @@ def test_folders_that_cannot_take_results(tmp_path: Path) -> None:
         ("nul\0byte", "must be"),
     ]:
         with pytest.raises(InputError, match=says) as caught:
-            output.check_folder(folder)
+            check_folder(folder)
         assert str(caught.value).startswith("output folder = ")
         assert "\n" not in str(caught.value)
-    output.check_folder(tmp_path / "new")
-    output.check_folder(tmp_path)
+    check_folder(tmp_path / "new")
+    check_folder(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {"file", "blocked"}
 
 
@@ -184,13 +186,13 @@ def test_a_read_only_folder_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
 
     monkeypatch.setattr(os, "mkdir", refuse)
     with pytest.raises(InputError, match=r"must be writable: Read-only file system"):
-        output.check_folder(tmp_path)
+        check_folder(tmp_path)
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder nobody can write to")
 def test_a_folder_nobody_can_write_to_is_refused() -> None:
     with pytest.raises(InputError, match="must be writable"):
-        output.check_folder("/proc/self")
+        check_folder("/proc/self")
 
 
 @pytest.mark.parametrize("earlier", [False, True])
@@ -216,15 +218,23 @@ def test_a_full_disk_leaves_the_folder_as_it_was(
 
 
 @pytest.mark.parametrize(
-    "step", ["_write_wires", "write_stl", "_write_frames", "_write_summary", "_flush"]
+    ("module", "step"),
+    [
+        *((output, f"write_{name}") for name in ("polylines", "stl", "collection", "summary")),
+        (results_folder, "_flush"),
+    ],
 )
 def test_an_interrupt_while_writing_leaves_nothing(
-    deployment: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
+    deployment: Deployment,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    module: ModuleType,
+    step: str,
 ) -> None:
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(output, step, interrupt)
+    monkeypatch.setattr(module, step, interrupt)
     with pytest.raises(KeyboardInterrupt):
         write_deployment(deployment, tmp_path / "out", frames=True, picture=False)
     assert list(tmp_path.iterdir()) == []
@@ -260,7 +270,7 @@ def test_results_can_be_written_from_a_thread(deployment: Deployment, tmp_path: 
 def test_a_disk_too_full_for_the_picture_costs_only_the_picture(
     deployment: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(output, "picture_png", lambda *_: b"x" * 3_000_000)
+    monkeypatch.setattr(picture, "pictures_png", lambda *_: [b"x" * 3_000_000])
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (2_500_000, limits[1]))
     try:

@@ -58,7 +58,7 @@ def export(
         from braidcast.atomic import write_atomically
         from braidcast.dataset import export as contents
         from braidcast.dataset.folder import DatasetFolder
-        from braidcast.deployment.output import check_folder
+        from braidcast.results_folder import check_folder
 
         opened = DatasetFolder.open(folder)
         check_folder(output)

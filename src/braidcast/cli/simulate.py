@@ -40,7 +40,8 @@ def simulate(
     """
     with told():
         from braidcast.case import Case
-        from braidcast.deployment.output import check_folder, write_deployment
+        from braidcast.deployment.output import write_deployment
+        from braidcast.results_folder import check_folder
 
         given = Case.from_toml(case)
         folder = f"{case.stem}_deployed" if output is None else output

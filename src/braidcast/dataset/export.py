@@ -7,12 +7,11 @@ import tempfile
 from io import StringIO
 from pathlib import Path
 
-import numpy as np
-
 from braidcast.dataset.case_file import DamagedFile
 from braidcast.dataset.fields import COSTS, NUMBERS
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.dataset.ledger import Ledger, read_result
+from braidcast.deployment.shape import nodes_of_wires, wire_distance
 from braidcast.deployment.vtp import write_polylines
 from braidcast.errors import InputError
 
@@ -72,15 +71,14 @@ def wires(folder: DatasetFolder, index: int) -> bytes:
     braid = case.braid
     positions = record.values["positions"].astype(float)
     arrays = {
-        "gap_mm": -case.vessel_geometry.distance(positions) - braid.wire_radius,
+        "gap_mm": wire_distance(case, positions),
         "contact_force_N": record.values["contact_force"],
         "displacement_mm": positions - braid.positions,
         "rotation_vector_rad": record.values["rotation_vector"],
         "wire": braid.wire_of_node,
         "ring": braid.rings,
     }
-    lines = np.arange(braid.node_count).reshape(braid.wires, -1)
     with tempfile.TemporaryDirectory() as work:
         file = Path(work) / "wires.vtp"
-        write_polylines(file, positions, lines, arrays)
+        write_polylines(file, positions, nodes_of_wires(braid), arrays)
         return file.read_bytes()

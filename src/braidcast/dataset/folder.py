@@ -24,8 +24,8 @@ from braidcast.atomic import TEMPORARY, write_atomically
 from braidcast.case import Case
 from braidcast.dataset.draw import DrawProgress, discrepancies, draw
 from braidcast.dataset.plan import Plan
-from braidcast.deployment.output import check_folder
 from braidcast.errors import InputError
+from braidcast.results_folder import check_folder
 
 #: What a dataset folder looks like; a folder of a higher number is not for this braidcast.
 STORE_VERSION = 1

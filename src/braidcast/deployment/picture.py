@@ -1,7 +1,8 @@
-"""A picture of a deployed braid: vessel translucent, wires coloured by their distance to it.
+"""Pictures of a deployed braid: vessel translucent, wires coloured by a value at their nodes.
 
 Needs ``braidcast[pictures]``. The drawing is done in a process of its own, because VTK does not
-raise an error where it finds no OpenGL: it ends the process.
+raise an error where it finds no OpenGL: it ends the process. That process waits for no solver and
+no case to be imported: a scene is geometry alone.
 """
 
 from __future__ import annotations
@@ -9,26 +10,26 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.util import find_spec
-from io import BytesIO
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from braidcast.deployment.result import Array, Deployment
+from braidcast.results_folder import Written, add, workplace
 
 if TYPE_CHECKING:
-    import pyvista
+    from braidcast.deployment.shape import DeployedBraid
 
-#: Wires are 28 µm thick: at their own size most would be thinner than a pixel.
-MAGNIFICATION = 2.0
-SIZE = (1600, 900)
+Array = NDArray[np.float64]
+Surface = tuple[Array, NDArray[np.int64]]
+"""Vertices (n, 3) mm and triangles (m, 3)."""
+
 #: The same colour means the same distance in every picture; this and more, mm, is the last one.
 FARTHEST = 1.0
-#: Where stent and sac may be, as shares of the picture's height: scale below, caption above.
-BELOW, ABOVE = 0.16, 0.86
 
 _PATIENCE_SECONDS = 120.0
 
@@ -37,8 +38,93 @@ class PictureError(RuntimeError):
     """Why there is no picture, and what would give one."""
 
 
-def picture_png(deployment: Deployment, surface: tuple[Array, NDArray[np.int64]]) -> bytes:
-    """Draw the deployment and its vessel's ``surface`` (vertices, triangles); PNG bytes.
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A braid of N nodes as one picture shows it; mm."""
+
+    positions: Array
+    """Nodes, (N, 3) mm."""
+    wires: NDArray[np.int64]
+    """Nodes along each wire, (wires, segments + 1)."""
+    wire_radius: float
+    values: Array
+    """What gives the nodes their colour, (N,)."""
+    legend: str
+    """What the values are, above the scale of colours."""
+    limits: tuple[float, float]
+    """Values of the first and the last colour."""
+    title: str
+    lines: tuple[str, ...]
+    """Small print below the title."""
+    along: Array
+    """From P0 to P2, (3,)."""
+    upward: Array
+    """To the side of the vessel that is shown above, (3,)."""
+    sac: tuple[Array, float] | None
+    """Centre (3,) and radius of the sac, shown as a whole."""
+
+
+def scene(
+    braid: DeployedBraid,
+    values: Array,
+    legend: str,
+    limits: tuple[float, float],
+    lines: tuple[str, ...],
+) -> Scene:
+    """The braid with values (N,) at its nodes, seen with the sac upwards."""
+    case = braid.case
+    centreline, sac = case.centreline, case.vessel_geometry.aneurysm
+    if sac is not None:
+        upward = sac.centre - centreline.at_arc_length(centreline.length / 2.0)[0]
+    else:
+        upward = centreline.P1 - 0.5 * (centreline.P0 + centreline.P2)
+    title = " ".join(case.title.split()) or "Deployed stent"
+    return Scene(
+        positions=braid.positions,
+        wires=braid.wires,
+        wire_radius=case.braid.wire_radius,
+        values=values,
+        legend=legend,
+        limits=limits,
+        title=shortened(title, 80),
+        lines=lines,
+        along=centreline.P2 - centreline.P0,
+        upward=upward,
+        sac=None if sac is None else (sac.centre, sac.radius),
+    )
+
+
+def scene_of_gaps(braid: DeployedBraid, lines: tuple[str, ...]) -> Scene:
+    """The braid coloured by the free space between wire and wall."""
+    legend = f"distance from wire to wall (mm; yellow: {FARTHEST:g} mm or more)"
+    return scene(braid, braid.wire_distance, legend, (0.0, FARTHEST), lines)
+
+
+def shortened(text: str, length: int) -> str:
+    """``text``, its end given up where it is longer than ``length``."""
+    return text if len(text) <= length else text[: length - 3] + "..."
+
+
+def add_pictures(scenes: Mapping[str, Scene], surface: Surface, folder: Path) -> Written:
+    """Draw the files of these names into ``folder``, or say in a note why they are not there.
+
+    The results are there: a picture is not worth failing for.
+    """
+    try:
+        drawn = pictures_png(list(scenes.values()), surface)
+        with workplace(folder) as work:
+            for name, png in zip(scenes, drawn, strict=True):
+                (work / name).write_bytes(png)
+            return Written(add(work, folder), [])
+    except PictureError as error:
+        reason = str(error)
+    except OSError as error:
+        reason = error.strerror or str(error)
+    return Written([], [f"no {' and no '.join(scenes)}: {reason}"])
+
+
+def pictures_png(scenes: list[Scene], surface: Surface) -> list[bytes]:
+    """Draw each scene in the vessel's ``surface``; PNG bytes.
 
     ``PictureError`` if PyVista is not installed or finds no OpenGL on this machine.
     """
@@ -46,8 +132,8 @@ def picture_png(deployment: Deployment, surface: tuple[Array, NDArray[np.int64]]
         raise PictureError("PyVista is not installed: pip install 'braidcast[pictures]'")
     try:
         drawn = subprocess.run(
-            [sys.executable, "-m", "braidcast.deployment.picture"],
-            input=pickle.dumps((replace(deployment, frames=[]), surface)),
+            [sys.executable, "-m", "braidcast.deployment.drawing"],
+            input=pickle.dumps((scenes, surface)),
             capture_output=True,
             timeout=_PATIENCE_SECONDS,
         )
@@ -55,163 +141,7 @@ def picture_png(deployment: Deployment, surface: tuple[Array, NDArray[np.int64]]
         raise PictureError(f"the drawing process failed: {error}") from None
     if drawn.returncode < 0:
         raise PictureError("VTK found no OpenGL here: install libegl1, or Mesa's software OpenGL")
-    if drawn.returncode or not drawn.stdout.startswith(b"\x89PNG"):
+    if drawn.returncode or not drawn.stdout.startswith(pickle.PROTO):
         said = drawn.stderr.decode(errors="replace").strip().splitlines() or ["no reason given"]
         raise PictureError(f"the picture could not be drawn: {said[-1]}")
-    return drawn.stdout
-
-
-def draw(deployment: Deployment, surface: tuple[Array, NDArray[np.int64]]) -> bytes:
-    """The same in this process, at the risk of its life."""
-    import pyvista
-    from PIL import Image
-
-    vertices, triangles = surface
-    faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
-    plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE))
-    try:
-        plotter.set_background("white")
-        plotter.enable_parallel_projection()
-        plotter.enable_depth_peeling(8)
-        plotter.enable_anti_aliasing("ssaa")
-        plotter.add_mesh(
-            pyvista.PolyData(np.asarray(vertices, dtype=np.float64), faces),
-            color="#d9a08f",
-            opacity=0.25,
-            smooth_shading=True,
-            split_sharp_edges=True,
-            specular=0.2,
-        )
-        wires = deployment.to_polydata()
-        radius = MAGNIFICATION * deployment.case.braid.wire_radius
-        plotter.add_mesh(
-            wires.tube(radius=radius, n_sides=8),
-            scalars="gap_mm",
-            clim=(0.0, FARTHEST),
-            cmap="viridis",
-            smooth_shading=True,
-            scalar_bar_args={
-                "title": f"distance from wire to wall (mm; yellow: {FARTHEST:g} mm or more)\n",
-                "color": "black",
-                "fmt": "%.1f",
-                "n_labels": 6,
-                "width": 0.4,
-                "height": 0.1,
-                "position_x": 0.3,
-                "position_y": 0.02,
-                "title_font_size": 24,
-                "label_font_size": 22,
-            },
-        )
-        title, *lines = _caption(deployment)
-        for text, height, size in ((title, 0.945, 16), ("\n".join(lines), 0.875, 12)):
-            plotter.add_text(
-                text,
-                position=(0.015, height),
-                viewport=True,
-                font_size=size,
-                color="black",
-                shadow=False,
-            )
-        view = _view(deployment)
-        _aim(plotter, view)
-        _add_ruler(plotter, view)
-        image = np.asarray(plotter.screenshot(return_img=True))
-    finally:
-        plotter.close()
-    stream = BytesIO()
-    Image.fromarray(image).save(stream, format="PNG", optimize=True)
-    return stream.getvalue()
-
-
-def _caption(deployment: Deployment) -> list[str]:
-    d = deployment
-    title = " ".join(d.case.title.split()) or "Deployed stent"
-    outcome = f"outcome: {d.outcome}"
-    if d.case.aneurysm is not None:
-        outcome += f", {d.end_nodes_in_sac} of {len(d.case.braid.end_nodes)} end nodes in the sac"
-    return [
-        title if len(title) <= 80 else title[:77] + "...",
-        outcome if d.converged else f"{outcome}; NOT CONVERGED",
-        f"wires drawn {MAGNIFICATION:g} times as thick as they are",
-    ]
-
-
-class _View(NamedTuple):
-    """A parallel view: unit vectors to the right, up and towards the eye, what it is centred on,
-    and half the height of what it shows, mm."""
-
-    right: Array
-    up: Array
-    eye: Array
-    centre: Array
-    half_height: float
-
-
-def _view(deployment: Deployment) -> _View:
-    """At right angles to the vessel's plane, the sac upwards, stent and sac filling it."""
-    case = deployment.case
-    shown = deployment.positions
-    along = _unit(case.centreline.P2 - case.centreline.P0, np.array([0.0, 0.0, 1.0]))
-    middle = case.centreline.at_arc_length(case.centreline.length / 2.0)[0]
-    aneurysm = case.vessel_geometry.aneurysm
-    if aneurysm is not None:
-        upward = aneurysm.centre - middle
-    else:
-        upward = case.centreline.P1 - 0.5 * (case.centreline.P0 + case.centreline.P2)
-    upward = upward - (upward @ along) * along
-    # A straight plain vessel has no plane: any direction across it will do.
-    across = np.eye(3)[np.argmin(np.abs(along))]
-    up = _unit(upward, np.cross(along, across))
-    # A little to the side and from above, so that tubes look round.
-    towards = np.cross(along, up)
-    eye = _unit(towards + 0.18 * up - 0.25 * along, towards)
-    right = _unit(np.cross(up, eye), along)
-    top = np.cross(eye, right)
-    frame = np.stack([right, top])
-    flat = shown @ frame.T
-    if aneurysm is not None:
-        sac = aneurysm.centre @ frame.T
-        flat = np.concatenate([flat, [sac - aneurysm.radius, sac + aneurysm.radius]])
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    width, height = high - low
-    half = max(0.5 * height / (ABOVE - BELOW), 0.5 * width * SIZE[1] / SIZE[0] / 0.92)
-    # The middle of the free band between caption and scale is not the middle of the picture.
-    off = np.array([0.0, (1.0 - ABOVE - BELOW) * half])
-    centre = (0.5 * (low + high) + off) @ frame + (shown @ eye).mean() * eye
-    return _View(right, top, eye, centre, half)
-
-
-def _aim(plotter: pyvista.Plotter, view: _View) -> None:
-    camera = plotter.camera
-    camera.focal_point = tuple(view.centre)
-    camera.position = tuple(view.centre + 200.0 * view.eye)
-    camera.up = tuple(view.up)
-    camera.parallel_scale = view.half_height
-    plotter.reset_camera_clipping_range()
-
-
-def _add_ruler(plotter: pyvista.Plotter, view: _View) -> None:
-    """A line as long as a round number of millimetres, with that number, at the lower left."""
-    import pyvista
-
-    half = view.half_height * np.array([SIZE[0] / SIZE[1], 1.0])
-    length = max(n for n in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if n <= max(0.1, half[0] / 2))
-    left, low = -0.97 * half[0], -0.88 * half[1]
-    # Nearer to the eye than anything else, so that nothing hides it.
-    plane = view.centre + 100.0 * view.eye + low * view.up
-    ends = plane + left * view.right, plane + (left + length) * view.right
-    plotter.add_mesh(pyvista.Line(*ends), color="black", line_width=4, lighting=False)
-    plotter.add_text(
-        f"{length:g} mm", position=(0.015, 0.015), viewport=True, font_size=12, color="black"
-    )
-    plotter.reset_camera_clipping_range()
-
-
-def _unit(vector: Array, otherwise: Array) -> Array:
-    size = np.linalg.norm(vector)
-    return vector / size if size > 1e-9 else otherwise
-
-
-if __name__ == "__main__":
-    sys.stdout.buffer.write(draw(*pickle.load(sys.stdin.buffer)))
+    return pickle.loads(drawn.stdout)

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from braidcast.case import Case
+from braidcast.deployment.polydata import polydata
+from braidcast.deployment.shape import foreshortening_percent, nodes_of_wires
 
 if TYPE_CHECKING:
     import pyvista
@@ -64,7 +66,7 @@ class Deployment:
     @property
     def foreshortening_percent(self) -> float:
         """Length lost from the crimped to the deployed stent, in percent of the crimped length."""
-        return 100.0 * (1.0 - self.deployed_length_mm / self.crimped_length_mm)
+        return foreshortening_percent(self.deployed_length_mm, self.crimped_length_mm)
 
     @property
     def point_arrays(self) -> dict[str, NDArray[Any]]:
@@ -82,20 +84,8 @@ class Deployment:
     @property
     def wires(self) -> NDArray[np.int64]:
         """Nodes along each wire, (wires, segments + 1)."""
-        braid = self.case.braid
-        return np.arange(braid.node_count).reshape(braid.wires, -1)
+        return nodes_of_wires(self.case.braid)
 
     def to_polydata(self) -> pyvista.PolyData:
         """The wires as polylines with their point arrays; needs ``braidcast[pictures]``."""
-        try:
-            import pyvista
-        except ImportError as error:
-            raise ImportError(
-                "Deployment.to_polydata needs PyVista: pip install 'braidcast[pictures]'"
-            ) from error
-        wires = self.wires
-        lines = np.column_stack([np.full(len(wires), wires.shape[1]), wires])
-        data = pyvista.PolyData(np.array(self.positions), lines=lines.ravel())
-        for name, values in self.point_arrays.items():
-            data.point_data[name] = np.array(values)
-        return data
+        return polydata(self.positions, self.wires, self.point_arrays)

@@ -15,9 +15,9 @@ from braidcast.deployment.outcome import outcome
 from braidcast.deployment.position import RingPath, position
 from braidcast.deployment.release import USUAL_SHIFT, ReleaseOptions, release, wall
 from braidcast.deployment.result import Deployment
+from braidcast.deployment.shape import braid_length, ring_centres, wire_distance
 from braidcast.devices import Braid
 from braidcast.mechanics import Equilibrium, Joints, NewtonOptions, Problem, State
-from braidcast.mechanics.arrays import IntArray
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import System
 
@@ -134,7 +134,7 @@ def _stages(
 
 def _target_centreline(case: Case, crimped: Array) -> Array:
     """The paper's C_T: where the ring centres of the crimped braid go, (rings, 3) mm."""
-    heights = _ring_centres(crimped, np.array(case.braid.rings))[:, 2]
+    heights = ring_centres(case.braid, crimped)[:, 2]
     arc_lengths = case.start_arc_length + heights - heights[0]
     return case.centreline.at_arc_length(arc_lengths)
 
@@ -165,20 +165,19 @@ def _deployment(
     seconds: tuple[float, float],
 ) -> Deployment:
     braid, state = case.braid, last.state
-    rings = np.array(braid.rings)
     # positioning knows no wall, and leaves none of its memories
     evaluation = system.evaluate(state, memories=last.memories or None, tangent=False)
     contacts = evaluation.contacts[0]
     total = contacts.total
-    wire_distance = -case.vessel_geometry.distance(state.positions) - braid.wire_radius
-    labels = outcome(case, state.positions, wire_distance)
+    gaps = wire_distance(case, state.positions)
+    labels = outcome(case, state.positions, gaps)
     return Deployment(
         case=case,
         positions=state.positions,
         rotations=state.rotations,
         elements=np.array(braid.elements),
         crossings=np.array(braid.crossings),
-        wire_distance=wire_distance,
+        wire_distance=gaps,
         contact_force=system.contact_force_at_nodes(contacts),
         outcome=labels.label,
         clinical_outcome=labels.clinical_label,
@@ -190,23 +189,11 @@ def _deployment(
         strain_energy_mJ=evaluation.strain_energy,
         max_penetration_mm=contacts.penetration,
         positioned_centreline=_target_centreline(case, crimped),
-        crimped_length_mm=_length(crimped, rings),
-        deployed_length_mm=_length(state.positions, rings),
+        crimped_length_mm=braid_length(braid, crimped),
+        deployed_length_mm=braid_length(braid, state.positions),
         free_length_mm=braid.length,
         end_nodes_in_sac=labels.end_nodes_in_sac,
         wall_seconds=seconds[0],
         cpu_seconds=seconds[1],
         frames=frames,
     )
-
-
-def _ring_centres(positions: Array, rings: IntArray) -> Array:
-    count = np.bincount(rings)
-    sums = [np.bincount(rings, weights=coordinate) for coordinate in positions.T]
-    return np.stack(sums, axis=1) / count[:, None]
-
-
-def _length(positions: Array, rings: IntArray) -> float:
-    """Length of the line through the ring centres, mm."""
-    segments = np.diff(_ring_centres(positions, rings), axis=0)
-    return float(np.linalg.norm(segments, axis=1).sum())

@@ -5,8 +5,7 @@ one for each,
 
     k(x, x') = σ² (1 + √5 r + 5 r²/3) exp(−√5 r),    r² = Σ ((x_i − x'_i)/l_i)²,
 
-and noise s² on what was observed; all are found by maximum likelihood on standardised outputs
-(scikit-learn). Given observations y at X the outputs at x are normal with (Rasmussen & Williams
+and noise s² on what was observed; all are found by maximum likelihood on standardised outputs. Given observations y at X the outputs at x are normal with (Rasmussen & Williams
 2006, section 2.2)
 
     mean k(x, X) (K + s² I)⁻¹ y,    variance k(x, x) − k(x, X) (K + s² I)⁻¹ k(X, x) + s².
@@ -16,16 +15,14 @@ Where a mirror image of the problem is known, x → M x, an output that keeps it
 counts for its image too.
 """
 
-import warnings
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve, cholesky, solve_triangular
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import ConstantKernel, Kernel, Matern, WhiteKernel
+from scipy.linalg import LinAlgError, cho_solve, cholesky, solve_triangular
+from scipy.optimize import minimize
+from scipy.spatial.distance import cdist
 
 from braidcast.errors import InputError
 
@@ -133,76 +130,67 @@ def fit_processes(
         )
     if not (np.isfinite(inputs).all() and np.isfinite(outputs).all()):
         raise InputError("inputs and outputs must be finite numbers")
-    count = outputs.shape[1]
+    count, width = outputs.shape[1], 1 if isotropic else inputs.shape[1]
     mirror = np.ones(inputs.shape[1]) if mirror is None else mirror
     parity = np.zeros(count) if parity is None else parity
     # what changes its sign in the mirror has the mean 0
     offset = np.where(parity < 0, 0.0, outputs.mean(axis=0))
-    scale = np.sqrt(((outputs - offset) ** 2).mean(axis=0))
-    scale[scale == 0.0] = 1.0
-    scales, signal, noise = np.empty((count, inputs.shape[1])), np.empty(count), np.empty(count)
+    size = np.sqrt(((outputs - offset) ** 2).mean(axis=0))
+    size[size == 0.0] = 1.0
+    # from longer lengths the search may end where all is noise
+    start = np.log([1.0, *[1.5] * width, 1e-2])
+    bounds = np.log([(1e-3, 1e3), *[LENGTH_BOUNDS] * width, NOISE_BOUNDS])
+    found = np.empty((count, 2 + width))
     for output in range(count):
-        start = np.full(1 if isotropic else inputs.shape[1], 3.0)
-        own = Matern(start, LENGTH_BOUNDS, nu=2.5)
-        if parity[output]:
-            own = Mirrored(own, mirror, float(parity[output]))
-        kernel = ConstantKernel(1.0, (1e-3, 1e3)) * own + WhiteKernel(1e-3, NOISE_BOUNDS)
-        process = GaussianProcessRegressor(kernel, alpha=JITTER)
-        with warnings.catch_warnings():
-            # a length scale at its bound is an input that does not matter, and no fault
-            warnings.simplefilter("ignore", ConvergenceWarning)
-            process.fit(inputs, (outputs[:, output] - offset[output]) / scale[output])
-        found = np.exp(process.kernel_.theta)
-        signal[output], noise[output] = (
-            scale[output] ** 2 * found[0],
-            scale[output] ** 2 * found[-1],
-        )
-        scales[output] = found[1:-1]
+        observed = (outputs[:, output] - offset[output]) / size[output]
+        data = (inputs, observed, mirror, parity[output])
+        best = minimize(_misfit, start, data, "L-BFGS-B", jac=True, bounds=bounds)
+        found[output] = np.exp(best.x)
+    scales = np.broadcast_to(found[:, 1:-1], (count, inputs.shape[1])).copy()
+    signal, noise = (size[:, None] ** 2 * found[:, [0, -1]]).T
     return GaussianProcesses(inputs, outputs, scales, signal, noise, offset, mirror, parity)
 
 
-class Mirrored(Kernel):
-    """k(x, x') ± k(x, M x') of a stationary kernel k, for scikit-learn."""
+def _misfit(
+    theta: Array, inputs: Array, observed: Array, mirror: Array, parity: float
+) -> tuple[float, Array]:
+    """Negative logarithm of the likelihood of ``observed`` (n,), and its gradient.
 
-    def __init__(self, kernel: Kernel, mirror: Array, parity: float) -> None:
-        self.kernel = kernel
-        self.mirror = mirror
-        self.parity = parity
+    ``theta`` are the logarithms of signal, length scales, noise. With a = K⁻¹ y,
 
-    def get_params(self, deep: bool = True) -> dict[str, object]:
-        return {"kernel": self.kernel, "mirror": self.mirror, "parity": self.parity}
-
-    @property
-    def hyperparameters(self) -> list[object]:
-        return self.kernel.hyperparameters
-
-    @property
-    def theta(self) -> Array:
-        return self.kernel.theta
-
-    @theta.setter
-    def theta(self, theta: Array) -> None:
-        self.kernel.theta = theta
-
-    @property
-    def bounds(self) -> Array:
-        return self.kernel.bounds
-
-    def __call__(self, X: Array, Y: Array | None = None, eval_gradient: bool = False):  # type: ignore[no-untyped-def]
-        images = (X if Y is None else Y) * self.mirror
-        if not eval_gradient:
-            return self.kernel(X, Y) + self.parity * self.kernel(X, images)
-        # scikit-learn gives gradients for one set of points only: take points and images together
-        both, gradient = self.kernel(np.concatenate([X, images]), eval_gradient=True)
-        n = len(X)
-        value = both[:n, :n] + self.parity * both[:n, n:]
-        return value, gradient[:n, :n] + self.parity * gradient[:n, n:]
-
-    def diag(self, X: Array) -> Array:
-        return np.array([self(row[None])[0, 0] for row in X])
-
-    def is_stationary(self) -> bool:
-        return False
+        -log p = y·a/2 + log det K / 2 + const,    gradient = tr((K⁻¹ − a aᵀ) ∂K)/2.
+    """
+    signal, noise = np.exp(theta[0]), np.exp(theta[-1])
+    points = inputs / np.exp(theta[1:-1])
+    views = [(1.0, np.ones_like(mirror))] + ([(parity, mirror)] if parity else [])
+    correlation, slopes = np.zeros((len(points), len(points))), []
+    for sign, view in views:
+        r = np.sqrt(5.0 * cdist(points, points * view, "sqeuclidean"))
+        decay = sign * np.exp(-r)
+        correlation += (1.0 + r + r * r / 3.0) * decay
+        slopes.append((1.0 + r) * decay)
+    covariance = signal * correlation
+    covariance[np.diag_indices_from(covariance)] += noise + JITTER * signal
+    try:
+        factor = cholesky(covariance, lower=True, check_finite=False)
+    except LinAlgError:
+        return np.inf, np.zeros_like(theta)
+    weights = cho_solve((factor, True), observed)
+    left = cho_solve((factor, True), np.eye(len(points)), check_finite=False)
+    left -= np.outer(weights, weights)
+    gradient = np.empty_like(theta)
+    gradient[0] = 0.5 * signal * ((left * correlation).sum() + JITTER * np.trace(left))
+    gradient[-1] = 0.5 * noise * np.trace(left)
+    along = np.zeros(inputs.shape[1])
+    for slope, (_, view) in zip(slopes, views, strict=True):
+        # sum of left_ij slope_ij (z_i − M z_j)² without a table for each input
+        pull = left * slope
+        crossed = (points * (pull @ points)).sum(axis=0)
+        along += 2.0 * (pull.sum(axis=1) @ points**2 - view * crossed)
+    along *= 0.5 * signal * 5.0 / 3.0
+    gradient[1:-1] = along if len(theta) > 3 or len(along) == 1 else along.sum()
+    misfit = 0.5 * observed @ weights + np.log(np.diag(factor)).sum()
+    return misfit + 0.5 * len(observed) * np.log(2.0 * np.pi), gradient
 
 
 def _matern(steps: Array, length_scales: Array) -> Array:
