@@ -5,7 +5,8 @@ one for each,
 
     k(x, x') = σ² (1 + √5 r + 5 r²/3) exp(−√5 r),    r² = Σ ((x_i − x'_i)/l_i)²,
 
-and noise s² on what was observed; all are found by maximum likelihood on standardised outputs. Given observations y at X the outputs at x are normal with (Rasmussen & Williams
+and noise s² on what was observed; all are found by maximum likelihood on standardised outputs.
+Given observations y at X the outputs at x are normal with (Rasmussen & Williams
 2006, section 2.2)
 
     mean k(x, X) (K + s² I)⁻¹ y,    variance k(x, x) − k(x, X) (K + s² I)⁻¹ k(X, x) + s².
