@@ -43,7 +43,9 @@ def test_rings_are_turned_as_the_simulation_turns_them(P0: tuple[float, float, f
     )
     placed = placed_braid(case)
     rings = np.arange(case.braid.segments + 1)
-    centres = np.array([placed.positions[placed.rings == ring].mean(axis=0) for ring in rings])
+    centres = np.array(
+        [placed.positions[np.array(case.braid.rings) == ring].mean(axis=0) for ring in rings]
+    )
     turns = RingPath.along(centres).rings(1.0)[1]
     # the first segment's chord is not quite the tangent of the first ring
     assert np.abs(turns - placed.axes).max() < 0.02

@@ -7,11 +7,13 @@ axes, and it is one of the null models every surrogate must beat.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from braidcast.case import Case
+from braidcast.devices import Braid
 
 Array = NDArray[np.float64]
 
@@ -28,11 +30,12 @@ class PlacedBraid:
 
     positions: Array
     axes: Array
-    rings: NDArray[np.int64]
+    length: float
+    """Of the centreline between the end rings, mm."""
 
     def departure(self, positions: Array) -> Array:
         """How far nodes (N, 3) lie from their places, in the axes of their rings, (N, 3) mm."""
-        return np.einsum("nji,nj->ni", self.axes[self.rings], positions - self.positions)
+        return _by_ring(positions - self.positions, self.axes)
 
     def moved(self, departure: Array) -> Array:
         """Nodes (N, 3) mm that lie so far from their places."""
@@ -40,7 +43,7 @@ class PlacedBraid:
 
     def turned(self, vectors: Array) -> Array:
         """Vectors (N, 3), given in the axes of the nodes' rings, in those of space."""
-        return np.einsum("nij,nj->ni", self.axes[self.rings], vectors)
+        return _by_ring(vectors, self.axes.transpose(0, 2, 1))
 
 
 def placed_braid(case: Case) -> PlacedBraid:
@@ -56,10 +59,22 @@ def placed_braid(case: Case) -> PlacedBraid:
     )
     first = case.centreline.tangent_at_arc_length([0.0])
     axes = _smallest_turns(first[0], tangents) @ _smallest_turns(Z_AXIS, first)
-    across = braid.positions_on_cylinder(radius, 0.0)
-    rings = np.array(braid.rings)
-    positions = centres[rings] + np.einsum("nij,nj->ni", axes[rings], across)
-    return PlacedBraid(positions, axes, rings)
+    across = radius * _unit_cylinder(braid)
+    turned = _by_ring(across, axes.transpose(0, 2, 1))
+    positions = np.tile(centres, (braid.wires, 1)) + turned
+    return PlacedBraid(positions, axes, length)
+
+
+@lru_cache
+def _unit_cylinder(braid: Braid) -> Array:
+    """Nodes (N, 3) of a braid without length on a cylinder of the radius 1."""
+    return braid.positions_on_cylinder(1.0, 0.0)
+
+
+def _by_ring(vectors: Array, factors: Array) -> Array:
+    """Vectors (N, 3), wire after wire, as rows times the factors (rings, 3, 3) of their rings."""
+    rings = vectors.reshape(-1, len(factors), 3).transpose(1, 0, 2)
+    return (rings @ factors).transpose(1, 0, 2).reshape(-1, 3)
 
 
 def _smallest_turns(start: Array, ends: Array) -> Array:
@@ -67,9 +82,17 @@ def _smallest_turns(start: Array, ends: Array) -> Array:
 
     R = c I + [v] + v vᵀ/(1 + c),  v = start × end,  c = start · end; half a turn goes about x.
     """
-    v, c = np.cross(start, ends), ends @ start
+    v, c = ends @ _cross_matrix(start).T, ends @ start
     share = np.divide(1.0, 1.0 + c, out=np.zeros_like(c), where=c > -1.0 + 1e-12)
     turns = c[:, None, None] * np.eye(3) + share[:, None, None] * v[:, :, None] * v[:, None, :]
-    turns += np.cross(np.eye(3), v[:, None, :])
+    turns += _cross_matrix(v)
     turns[c <= -1.0 + 1e-12] = np.diag([1.0, -1.0, -1.0])
     return turns
+
+
+def _cross_matrix(v: Array) -> Array:
+    """[v] (..., 3, 3) with [v] w = v × w, of vectors (..., 3)."""
+    matrix = np.zeros((*v.shape, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        matrix[..., j, k], matrix[..., k, j] = -v[..., i], v[..., i]
+    return matrix
