@@ -20,8 +20,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_solve, cholesky, solve_triangular
+from scipy.linalg import LinAlgError, cho_solve, cholesky
+from scipy.linalg.lapack import dtrtri
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
@@ -70,10 +72,7 @@ class GaussianProcesses:
         prior = self.signal + self.noise
         if self.parity.any():
             prior = prior + self.signal * self.parity * self._mirrored(points)
-        variance = np.empty_like(mean)
-        for output, factor in enumerate(self._factors):
-            half = solve_triangular(factor, covariance[:, :, output].T, lower=True)
-            variance[:, output] = prior[..., output] - (half * half).sum(axis=0)
+        variance = prior - _explained(self._inverses, covariance)
         return mean, np.sqrt(np.maximum(variance, 0.0))
 
     def _mean(self, covariance: Array) -> Array:
@@ -88,8 +87,14 @@ class GaussianProcesses:
         for output in range(len(self.signal)):
             own = np.array(covariance[:, :, output])
             own[diagonal, diagonal] += self.noise[output] + JITTER * self.signal[output]
-            factors.append(cholesky(own, lower=True))
+            factors.append(cholesky(np.asfortranarray(own), lower=True))
         return factors
+
+    @cached_property
+    def _inverses(self) -> Array:
+        """Inverses of the factors, their lower halves column after column, (L, n (n + 1)/2)."""
+        upper = np.triu_indices(len(self.inputs))
+        return np.stack([dtrtri(factor, lower=True)[0].T[upper] for factor in self._factors])
 
     @cached_property
     def _weights(self) -> Array:
@@ -192,6 +197,26 @@ def _misfit(
     gradient[1:-1] = along if len(theta) > 3 or len(along) == 1 else along.sum()
     misfit = 0.5 * observed @ weights + np.log(np.diag(factor)).sum()
     return misfit + 0.5 * len(observed) * np.log(2.0 * np.pi), gradient
+
+
+@njit(cache=True, error_model="numpy")
+def _explained(inverses: Array, covariance: Array) -> Array:
+    """|F⁻¹ k|² (m, L) of packed inverse factors and covariances (m, n, L): memory is the limit."""
+    m, n, count = covariance.shape
+    explained = np.empty((m, count))
+    half = np.empty(n)
+    for point in range(m):
+        for output in range(count):
+            half[:] = 0.0
+            begin = 0
+            for j in range(n):
+                pull = covariance[point, j, output]
+                column, rest = inverses[output, begin : begin + n - j], half[j:]
+                for i in range(n - j):
+                    rest[i] += column[i] * pull
+                begin += n - j
+            explained[point, output] = (half * half).sum()
+    return explained
 
 
 def _matern(steps: Array, length_scales: Array) -> Array:
