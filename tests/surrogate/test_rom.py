@@ -73,7 +73,7 @@ def test_intervals_hold_what_they_say() -> None:
 
 def test_samples_scatter_as_the_standard_deviation_says(plain: ReducedOrderModel) -> None:
     point = np.array([[0.2, -0.4]])
-    mean, std = plain.processes_.predict_with_std((point - plain.offset_) / plain.scale_)
+    mean, std = plain.processes_.predict_with_std(plain.standardised(point))
     samples = plain.sample(point, 4000, np.random.default_rng(7))
     coefficients = plain.basis_.coefficients(samples)
     assert np.abs(coefficients.std(axis=0) / std[0] - 1.0).max() < 0.06

@@ -16,7 +16,8 @@ Where a mirror image of the problem is known, x → M x, an output that keeps it
 counts for its image too.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +31,9 @@ from scipy.spatial.distance import cdist
 from braidcast.errors import InputError
 
 Array = NDArray[np.float64]
+
+Progress = Callable[[str, float], None]
+"""Told the stage of a long computation and its share that is done."""
 
 LENGTH_BOUNDS = (0.05, 1e3)
 """Of length scales, in standard deviations of the inputs."""
@@ -60,6 +64,18 @@ class GaussianProcesses:
     mirror: Array
     parity: Array
 
+    def first(self, count: int) -> "GaussianProcesses":
+        """The first ``count`` of them."""
+        return replace(
+            self,
+            outputs=self.outputs[:, :count],
+            length_scales=self.length_scales[:count],
+            signal=self.signal[:count],
+            noise=self.noise[:count],
+            offset=self.offset[:count],
+            parity=self.parity[:count],
+        )
+
     def predict(self, points: Array) -> Array:
         """Means (m, L) at points (m, p)."""
         return self._mean(self._covariance(np.atleast_2d(points)))
@@ -76,7 +92,7 @@ class GaussianProcesses:
         return mean, np.sqrt(np.maximum(variance, 0.0))
 
     def _mean(self, covariance: Array) -> Array:
-        return self.offset + np.einsum("mnl,nl->ml", covariance, self._weights)
+        return self.offset + np.einsum("mnl,nl->ml", covariance, self.weights)
 
     @cached_property
     def _factors(self) -> list[Array]:
@@ -97,7 +113,7 @@ class GaussianProcesses:
         return np.stack([dtrtri(factor, lower=True)[0].T[upper] for factor in self._factors])
 
     @cached_property
-    def _weights(self) -> Array:
+    def weights(self) -> Array:
         """(K + s² I)⁻¹ y, (n, L)."""
         centred = self.outputs - self.offset
         solved = [cho_solve((f, True), centred[:, i]) for i, f in enumerate(self._factors)]
@@ -123,6 +139,7 @@ def fit_processes(
     isotropic: bool = False,
     mirror: Array | None = None,
     parity: Array | None = None,
+    progress: Progress | None = None,
 ) -> GaussianProcesses:
     """Processes for outputs (n, L) over inputs (n, p), hyper-parameters by maximum likelihood.
 
@@ -152,6 +169,8 @@ def fit_processes(
         data = (inputs, observed, mirror, parity[output])
         best = minimize(_misfit, start, data, "L-BFGS-B", jac=True, bounds=bounds)
         found[output] = np.exp(best.x)
+        if progress:
+            progress("train", (output + 1) / count)
     scales = np.broadcast_to(found[:, 1:-1], (count, inputs.shape[1])).copy()
     signal, noise = (size[:, None] ** 2 * found[:, [0, -1]]).T
     return GaussianProcesses(inputs, outputs, scales, signal, noise, offset, mirror, parity)

@@ -8,6 +8,7 @@ axes, and it is one of the null models every surrogate must beat.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,9 @@ class PlacedBraid:
     into the start of the vessel and on along it without twisting about it.
     """
 
+    PAIRS: ClassVar = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    """Components of a symmetric matrix in the order that ``variances_turned`` takes them."""
+
     positions: Array
     axes: Array
     length: float
@@ -44,6 +48,21 @@ class PlacedBraid:
     def turned(self, vectors: Array) -> Array:
         """Vectors (N, 3), given in the axes of the nodes' rings, in those of space."""
         return _by_ring(vectors, self.axes.transpose(0, 2, 1))
+
+    def variances_turned(self, covariance: Array) -> Array:
+        """Variances (N, 3) along x, y, z from covariances (6, N) in the axes of the rings.
+
+        The diagonal of R C Rᵀ, C by its ``PAIRS``.
+        """
+        by_ring = covariance.reshape(6, -1, len(self.axes)).transpose(2, 1, 0)
+        products = np.stack(
+            [
+                (1.0 if i == j else 2.0) * self.axes[:, :, i] * self.axes[:, :, j]
+                for i, j in self.PAIRS
+            ],
+            axis=1,
+        )
+        return (by_ring @ products).transpose(1, 0, 2).reshape(-1, 3)
 
 
 def placed_braid(case: Case) -> PlacedBraid:

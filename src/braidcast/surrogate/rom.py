@@ -8,6 +8,7 @@ gives each coefficient from the predictors,
 the diagonal of K_p = V K_L Vᵀ, which is never formed.
 """
 
+from copy import copy
 from dataclasses import dataclass
 from typing import Self
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from braidcast.surrogate.gaussian_process import fit_processes
+from braidcast.surrogate.gaussian_process import Progress, fit_processes
 from braidcast.surrogate.pod import Basis, pod
 
 Array = NDArray[np.float64]
@@ -60,7 +61,7 @@ class ReducedOrderModel(RegressorMixin, BaseEstimator):
         self.isotropic = isotropic
         self.mirror = mirror
 
-    def fit(self, X: Array, y: Array) -> Self:
+    def fit(self, X: Array, y: Array, progress: Progress | None = None) -> Self:
         """Learn from predictors (n, p) and snapshots (n, d)."""
         X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
         self.scale_ = X.std(axis=0)
@@ -76,11 +77,12 @@ class ReducedOrderModel(RegressorMixin, BaseEstimator):
         left_out = y - self.basis_.snapshots(coefficients)
         self.left_out_ = (left_out * left_out).mean(axis=0)
         self.processes_ = fit_processes(
-            self._standardised(X),
+            self.standardised(X),
             coefficients,
             isotropic=self.isotropic,
             mirror=None if self.mirror is None else self.mirror.predictors,
             parity=parity,
+            progress=progress,
         )
         return self
 
@@ -90,8 +92,20 @@ class ReducedOrderModel(RegressorMixin, BaseEstimator):
         if not return_std:
             return self.basis_.snapshots(self.processes_.predict(points))
         mean, std = self.processes_.predict_with_std(points)
-        variance = (std * std) @ (self.basis_.modes * self.basis_.modes) + self.left_out_
+        variance = (std * std) @ self.basis_.modes**2 + self.left_out_
         return self.basis_.snapshots(mean), np.sqrt(variance)
+
+    def truncated(self, modes: int) -> Self:
+        """This fitted model with its first modes only; those dropped count as left out."""
+        check_is_fitted(self)
+        fewer = copy(self)
+        fewer.modes = modes
+        dropped = self.basis_.modes[modes:]
+        energy = (self.processes_.outputs[:, modes:] ** 2).mean(axis=0)
+        fewer.left_out_ = self.left_out_ + energy @ dropped**2
+        fewer.basis_ = self.basis_.truncated(modes)
+        fewer.processes_ = self.processes_.first(modes)
+        return fewer
 
     def sample(self, X: Array, count: int, rng: np.random.Generator) -> Array:
         """Snapshots (count, d) drawn at one set of predictors (1, p) or (p,)."""
@@ -101,9 +115,10 @@ class ReducedOrderModel(RegressorMixin, BaseEstimator):
 
     def _checked(self, X: Array) -> Array:
         check_is_fitted(self)
-        return self._standardised(validate_data(self, X, reset=False, dtype=np.float64))
+        return self.standardised(validate_data(self, X, reset=False, dtype=np.float64))
 
-    def _standardised(self, X: Array) -> Array:
+    def standardised(self, X: Array) -> Array:
+        """Predictors (m, p) as the processes take them."""
         return (X - self.offset_) / self.scale_
 
     def _decompose(self, snapshots: Array) -> tuple[Basis, Array | None]:
