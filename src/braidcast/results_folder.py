@@ -71,6 +71,18 @@ def check_folder(folder: str | Path) -> None:
         raise InputError(f"output folder = {folder} must be writable: {reason}") from None
 
 
+def check_file(path: str | Path) -> None:
+    """Raise ``InputError`` if a file could not be written at ``path``; nothing stays behind."""
+    path = Path(path)
+    if path.is_dir() or not path.name:
+        raise InputError(f"output file = {path} is a folder, must be a file or a new name")
+    if not path.parent.is_dir():
+        raise InputError(
+            f"output file = {path} must be in a folder that exists, {path.parent} does not"
+        )
+    check_folder(path.parent)
+
+
 @contextmanager
 def workplace(folder: Path) -> Iterator[Path]:
     """A hidden folder inside ``folder``, on the same disk so that a move is atomic."""

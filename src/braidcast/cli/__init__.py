@@ -12,7 +12,9 @@ import typer
 from braidcast import __version__
 from braidcast.cli import dataset
 from braidcast.cli.messages import told
+from braidcast.cli.predict import predict
 from braidcast.cli.simulate import simulate
+from braidcast.cli.train import evaluate, train
 
 app = typer.Typer(
     name="braidcast",
@@ -49,4 +51,7 @@ def _options(
 
 
 app.command(epilog="Example:  braidcast simulate examples/success.toml -o demo")(simulate)
+app.command(epilog="Example:  braidcast predict examples/success.toml -o predicted")(predict)
+app.command(epilog="Example:  braidcast train sixty -o sixty.npz")(train)
+app.command(epilog="Example:  braidcast evaluate sixty.npz sixty -o tested")(evaluate)
 app.add_typer(dataset.app, name="dataset")

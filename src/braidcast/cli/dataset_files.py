@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from braidcast.cli.dataset_run import Dataset, state, table
+from braidcast.cli.dataset_run import Dataset, state
 from braidcast.cli.messages import say, told
+from braidcast.cli.table import table
 
 
 def collect(

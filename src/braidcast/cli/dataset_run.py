@@ -9,6 +9,7 @@ import typer
 
 from braidcast.cli.messages import NOT_WRITTEN, say, told
 from braidcast.cli.run_display import run_display
+from braidcast.cli.table import table
 
 if TYPE_CHECKING:
     from braidcast.dataset.ledger import Ledger
@@ -117,7 +118,3 @@ def _effort(report: RunReport) -> list[tuple[str, str]]:
         ("workers", f"{report.workers}"),
         ("overhead", f"{report.overhead:.3f}, wall time x workers / CPU time of the cases"),
     ]
-
-
-def table(rows: list[tuple[str, str]]) -> str:
-    return "\n".join(f"{name:<22}{value}" for name, value in rows)

@@ -9,6 +9,7 @@ import typer
 
 from braidcast.cli.messages import NOT_CONVERGED, say, told
 from braidcast.cli.progress import bars
+from braidcast.cli.table import table
 
 if TYPE_CHECKING:
     from braidcast.deployment.result import Deployment
@@ -83,4 +84,4 @@ def _report(deployment: Deployment, files: list[Path]) -> str:
         ("files", ", ".join(path.name for path in files if path.parent == files[-1].parent)),
         ("in", f"{files[-1].parent}"),
     ]
-    return "\n".join(f"{name:<22}{value}" for name, value in rows)
+    return table(rows)

@@ -41,10 +41,14 @@ class Applicability:
             low, high = self.limits[name]
             slack = ROUNDING * max(1.0, abs(low), abs(high))
             if not low - slack <= value <= high + slack:
-                unit = "" if name in ("aneurysm_protrusion", "site_eta", "wall_friction") else " mm"
                 trained = f"at {low:g}" if low == high else f"from {low:g} to {high:g}"
-                phrases.append(f"{name} = {value:.4g}{unit}, trained {trained}{unit}")
+                phrases.append(f"{name} = {value:.4g}{unit(name)}, trained {trained}{unit(name)}")
         return tuple(phrases)
+
+
+def unit(name: str) -> str:
+    """ " mm" or "", as the field is a length or a pure number."""
+    return "" if name in ("aneurysm_protrusion", "site_eta", "wall_friction") else " mm"
 
 
 def fields(case: Case) -> dict[str, float]:

@@ -26,9 +26,9 @@ class SurrogateModel:
 
     ``rom`` gives the shape of a successful deployment, ``ends`` the probability that it succeeds,
     called so from ``threshold`` on; ``interval_factor`` widens the standard deviations so that
-    95 % intervals hold what they say. ``case``: one of those ``rom`` learned from; ``numbers`` (n,) of
-    all of them in their dataset. ``record``: of which data it was made, when, by which versions, and its own test
-    figures.
+    95 % intervals hold what they say. ``case``: one of those ``rom`` learned from, and ``numbers``
+    (n,) of all of them in their dataset. ``record``: of which data the model was made, by which
+    versions, and its own test figures.
     """
 
     recipe: Recipe
@@ -81,6 +81,16 @@ class SurrogateModel:
         view = self.recipe.view(case)
         coefficients = self.rom.processes_.predict(self.rom.standardised(view.predictors[None]))
         return self._positions(view.reference, coefficients[0])
+
+    def success_probability(self, case: Case) -> float:
+        """Probability that the deployment succeeds."""
+        return float(self.ends.success_probability(self.recipe.view(case).ends[None])[0])
+
+    def projected(self, case: Case, positions: Array) -> Array:
+        """The best that the modes can do for nodes (N, 3) mm of a simulated case."""
+        reference = self.recipe.view(case).reference
+        snapshot = reference.departure(positions).reshape(1, -1)
+        return self._positions(reference, self.rom.basis_.coefficients(snapshot)[0])
 
     def _positions(self, reference: PlacedBraid, coefficients: Array) -> Array:
         snapshot = self.rom.basis_.snapshots(coefficients)

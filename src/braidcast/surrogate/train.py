@@ -1,7 +1,7 @@
 """Train a surrogate on the simulations of a dataset."""
 
 import platform
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 
 import numpy as np
@@ -11,6 +11,7 @@ from braidcast import __version__
 from braidcast.errors import InputError
 from braidcast.surrogate.applicability import Applicability
 from braidcast.surrogate.ends import EndsClassifier
+from braidcast.surrogate.evaluate import Evaluation, evaluate
 from braidcast.surrogate.gaussian_process import Progress
 from braidcast.surrogate.model import SurrogateModel
 from braidcast.surrogate.recipes import Recipe, View
@@ -99,3 +100,29 @@ def train(
             },
         },
     )
+
+
+def train_and_test(
+    simulations: Simulations,
+    recipe: Recipe,
+    *,
+    cases: int | None = None,
+    progress: Progress | None = None,
+) -> tuple[SurrogateModel, Evaluation | None]:
+    """A model that carries its own test figures, and these; None if the dataset has no tests.
+
+    ``cases``: learn shapes from the first so many successes, outcomes from the cases up to the
+    last of them. ``InputError`` if there are not so many.
+    """
+    shapes = simulations.regression_training
+    outcomes = simulations.classification_training
+    if cases is not None:
+        if not FEWEST <= cases <= len(shapes):
+            raise InputError(f"cases = {cases} must be from {FEWEST} to {len(shapes)}")
+        shapes = shapes[:cases]
+        outcomes = outcomes[outcomes <= shapes[-1]]
+    model = train(simulations, recipe, shapes=shapes, outcomes=outcomes, progress=progress)
+    if not len(simulations.regression_tests):
+        return model, None
+    found = evaluate(model, simulations)
+    return replace(model, record={**model.record, "test": found.figures()}), found
