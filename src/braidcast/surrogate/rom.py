@@ -76,6 +76,8 @@ class ReducedOrderModel(RegressorMixin, BaseEstimator):
         coefficients = self.basis_.coefficients(y)
         left_out = y - self.basis_.snapshots(coefficients)
         self.left_out_ = (left_out * left_out).mean(axis=0)
+        if self.mirror is not None:
+            self.left_out_ = 0.5 * (self.left_out_ + self.left_out_[self.mirror.order])
         self.processes_ = fit_processes(
             self.standardised(X),
             coefficients,
