@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_solve, cholesky
-from scipy.linalg.lapack import dtrtri
+from scipy.linalg.lapack import dtrtri, dtrttp
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
@@ -109,8 +109,8 @@ class GaussianProcesses:
     @cached_property
     def _inverses(self) -> Array:
         """Inverses of the factors, their lower halves column after column, (L, n (n + 1)/2)."""
-        upper = np.triu_indices(len(self.inputs))
-        return np.stack([dtrtri(factor, lower=True)[0].T[upper] for factor in self._factors])
+        inverses = (dtrtri(factor, lower=True)[0] for factor in self._factors)
+        return np.stack([dtrttp(inverse, uplo="L")[0] for inverse in inverses])
 
     @cached_property
     def weights(self) -> Array:

@@ -1,6 +1,7 @@
 """Train a surrogate on the simulations of a dataset."""
 
 import platform
+import time
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 
@@ -65,6 +66,7 @@ def train(
     for case in cases:
         applicability.check_device(case)
     data = learned(recipe, simulations, shapes)
+    begin = time.process_time()
     tuning = tune(
         recipe.reduced_order_model(cases, recipe.modes or 0),
         data.predictors,
@@ -72,12 +74,14 @@ def train(
         progress,
         choose=recipe.modes is None,
     )
+    tuned = time.process_time()
     rom = recipe.reduced_order_model(cases, tuning.modes)
     rom.fit(data.predictors, data.snapshots, progress)
     seen: list[View] = [recipe.view(simulations.cases[index]) for index in outcomes]
     ends = EndsClassifier().fit(
         np.array([view.ends for view in seen]), simulations.end_in_sac[outcomes]
     )
+    trained = time.process_time()
     return SurrogateModel(
         recipe=recipe,
         rom=rom,
@@ -93,6 +97,7 @@ def train(
             "shapes": len(shapes),
             "outcomes": len(outcomes),
             "cross_validation": asdict(tuning),
+            "cpu_seconds": {"tuning": tuned - begin, "training": trained - tuned},
             "versions": {
                 "braidcast": __version__,
                 "python": platform.python_version(),

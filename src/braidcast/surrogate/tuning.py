@@ -14,7 +14,7 @@ from braidcast.surrogate.rom import ReducedOrderModel
 
 Array = NDArray[np.float64]
 
-MODES = (8, 12, 16, 20, 24, 30, 36)
+MODES = (8, 12, 16, 20, 24, 30)
 """Numbers of modes to choose from."""
 
 FOLDS = 5
