@@ -216,11 +216,14 @@ def page(found: dict[str, Result], rows: list[tuple[str, str, str, bool]]) -> st
         if key.startswith("outcomes"):
             low, high = r["intervals"]["accuracy"]
             low2, high2 = r["intervals"]["specificity"]
-            lines.append(
-                f"| {key[9:]} | {r['accuracy']:.3f} ({low:.2f}–{high:.2f}) "
-                f"| {r['sensitivity']:.3f} | {r['specificity']:.3f} ({low2:.2f}–{high2:.2f}) | {r['F1']:.3f} "
-                f"| {r['AUC']:.3f} | {r['Brier']:.3f} | {r['TP']} {r['FN']} {r['FP']} {r['TN']} |"
-            )
+            values = [
+                f"{r['accuracy']:.3f} ({low:.2f}–{high:.2f})",
+                f"{r['sensitivity']:.3f}",
+                f"{r['specificity']:.3f} ({low2:.2f}–{high2:.2f})",
+                *(f"{r[name]:.3f}" for name in ("F1", "AUC", "Brier")),
+                f"{r['TP']} {r['FN']} {r['FP']} {r['TN']}",
+            ]
+            lines.append(f"| {key[9:]} | {' | '.join(values)} |")
     return "\n".join(lines) + "\n"
 
 
