@@ -5,21 +5,21 @@ import tomllib
 from pathlib import Path
 
 import braidcast
-from braidcast import Case, Deployment
+from braidcast import Case, Deployment, Prediction
 from braidcast.deployment.output import summary
+from braidcast.surrogate import output
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def block(language: str) -> str:
-    found = re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.DOTALL | re.MULTILINE)
-    assert len(found) == 1
-    return found[0]
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.DOTALL | re.MULTILINE)
 
 
 def test_its_case_file_is_the_main_example_with_all_defaults_written_out() -> None:
-    shown = Case.from_dict(tomllib.loads(block("toml")))
+    (text,) = blocks("toml")
+    shown = Case.from_dict(tomllib.loads(text))
     example = Case.from_toml(ROOT / "examples" / "success.toml")
     assert shown.braid == example.braid
     assert abs(shown.crimped_radius - example.crimped_radius) < 5e-4
@@ -29,16 +29,19 @@ def test_its_case_file_is_the_main_example_with_all_defaults_written_out() -> No
 
 
 def test_its_python_names_exist() -> None:
-    code = block("python")
-    compile(code, "README.md", "exec")
-    for name in re.findall(r"braidcast\.(\w+)", code):
-        assert hasattr(braidcast, name)
-    for name in re.findall(r"deployment\.(\w+)", code):
-        assert name in Deployment.__dataclass_fields__ or hasattr(Deployment, name)
+    for code in blocks("python"):
+        compile(code, "README.md", "exec")
+        for name in re.findall(r"braidcast\.(\w+)", code):
+            assert hasattr(braidcast, name)
+        for variable, kind in (("deployment", Deployment), ("prediction", Prediction)):
+            for name in re.findall(rf"\b{variable}\.(\w+)", code):
+                assert name in kind.__dataclass_fields__ or hasattr(kind, name)
 
 
-def test_every_key_of_the_summary_and_every_array_is_explained(deployment: Deployment) -> None:
-    for name in (*summary(deployment), *deployment.point_arrays):
+def test_every_key_of_a_summary_and_every_array_is_explained(deployment: Deployment) -> None:
+    prediction = braidcast.load_model().predict(Case.from_toml(ROOT / "examples" / "success.toml"))
+    names = (*summary(deployment), *deployment.point_arrays)
+    for name in (*names, *output.summary(prediction), *prediction.point_arrays):
         assert f"`{name}`" in README
 
 
