@@ -1,4 +1,4 @@
-"""The model that ships with braidcast, against simulations of cases that it has not learned from."""
+"""The model that ships with braidcast, against simulations that it has not learned from."""
 
 from pathlib import Path
 

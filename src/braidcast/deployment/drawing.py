@@ -106,9 +106,11 @@ def _image(scene: Scene, vessel: pyvista.PolyData) -> NDArray[np.uint8]:
 
 
 def decimals(limits: tuple[float, float]) -> int:
-    """Decimals that tell the labels of the scale apart."""
+    """Decimals that the labels of the scale need to be what they say, to two digits."""
     step = (limits[1] - limits[0]) / (LABELS - 1)
-    return max(0, math.ceil(-math.log10(step) - 1e-9))
+    fewest = max(0, math.ceil(-math.log10(step) - 1e-9))
+    exact = abs(step - round(step, fewest)) < 1e-6 * step
+    return fewest if exact else fewest + 1
 
 
 class _View(NamedTuple):
