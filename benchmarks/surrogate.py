@@ -69,7 +69,7 @@ def other_regression(simulations: Simulations, kind: str, count: int) -> Result:
         kernel = ConstantKernel() * Matern(np.ones(X.shape[1]), (0.05, 1e3), nu=2.5)
         regressor = GaussianProcessRegressor(kernel + WhiteKernel(1e-3, (1e-7, 1.0)))
     else:
-        regressor = MLPRegressor((64, 64), activation="tanh", solver="lbfgs", alpha=1e-3,
+        regressor = MLPRegressor(hidden_layer_sizes=(64, 64), activation="tanh", solver="lbfgs", alpha=1e-3,
                                  max_iter=5000, random_state=0)  # fmt: skip
     regressor.fit(X, Y)
     found = outputs.inverse_transform(regressor.predict(inputs.transform(tests.predictors)))
