@@ -97,13 +97,13 @@ class GaussianProcesses:
     @cached_property
     def _factors(self) -> list[Array]:
         """Lower Cholesky factors (n, n) of the observations' covariance."""
-        covariance = self._covariance(self.inputs)
-        diagonal = np.arange(len(self.inputs))
         factors = []
-        for output in range(len(self.signal)):
-            own = np.array(covariance[:, :, output])
-            own[diagonal, diagonal] += self.noise[output] + JITTER * self.signal[output]
-            factors.append(cholesky(np.asfortranarray(own), lower=True))
+        for output, parity in enumerate(self.parity):
+            points = self.inputs / self.length_scales[output]
+            own, _ = _correlation(points, self.mirror, parity)
+            own *= self.signal[output]
+            own[np.diag_indices_from(own)] += self.noise[output] + JITTER * self.signal[output]
+            factors.append(cholesky(own, lower=True, overwrite_a=True, check_finite=False))
         return factors
 
     @cached_property
@@ -176,6 +176,24 @@ def fit_processes(
     return GaussianProcesses(inputs, outputs, scales, signal, noise, offset, mirror, parity)
 
 
+def _correlation(
+    points: Array, mirror: Array, parity: float
+) -> tuple[Array, list[tuple[Array, Array]]]:
+    """Correlation (n, n) of points (n, p), in length scales, and of what it changes with them.
+
+    The latter, (1 + √5 r) exp(−√5 r), for the points themselves and, if there are any, for their
+    images; each with the factors (p,) of the view.
+    """
+    views = [(1.0, np.ones_like(mirror))] + ([(parity, mirror)] if parity else [])
+    correlation, slopes = np.zeros((len(points), len(points))), []
+    for sign, view in views:
+        r = np.sqrt(5.0 * cdist(points, points * view, "sqeuclidean"))
+        decay = sign * np.exp(-r)
+        correlation += (1.0 + r + r * r / 3.0) * decay
+        slopes.append(((1.0 + r) * decay, view))
+    return correlation, slopes
+
+
 def _misfit(
     theta: Array, inputs: Array, observed: Array, mirror: Array, parity: float
 ) -> tuple[float, Array]:
@@ -187,13 +205,7 @@ def _misfit(
     """
     signal, noise = np.exp(theta[0]), np.exp(theta[-1])
     points = inputs / np.exp(theta[1:-1])
-    views = [(1.0, np.ones_like(mirror))] + ([(parity, mirror)] if parity else [])
-    correlation, slopes = np.zeros((len(points), len(points))), []
-    for sign, view in views:
-        r = np.sqrt(5.0 * cdist(points, points * view, "sqeuclidean"))
-        decay = sign * np.exp(-r)
-        correlation += (1.0 + r + r * r / 3.0) * decay
-        slopes.append((1.0 + r) * decay)
+    correlation, slopes = _correlation(points, mirror, parity)
     covariance = signal * correlation
     covariance[np.diag_indices_from(covariance)] += noise + JITTER * signal
     try:
@@ -207,7 +219,7 @@ def _misfit(
     gradient[0] = 0.5 * signal * ((left * correlation).sum() + JITTER * np.trace(left))
     gradient[-1] = 0.5 * noise * np.trace(left)
     along = np.zeros(inputs.shape[1])
-    for slope, (_, view) in zip(slopes, views, strict=True):
+    for slope, view in slopes:
         # sum of left_ij slope_ij (z_i − M z_j)² without a table for each input
         pull = left * slope
         crossed = (points * (pull @ points)).sum(axis=0)
