@@ -72,7 +72,7 @@ def test_seen_from_the_other_end() -> None:
 def test_ends_seen_from_the_other_end_change_places() -> None:
     spare = case().centreline.length - case().crimped_length
     other = case(z=22.0, eta=(spare - 0.3 * (spare - 0.5)) / (spare - 0.5))
-    ours, theirs = (end_predictors(c, placed_braid(c)) for c in (case(), other))
+    ours, theirs = (end_predictors(c, placed_braid(c), site(c)) for c in (case(), other))
     assert theirs[::-1] == pytest.approx(ours, abs=1e-9)
 
 

@@ -95,10 +95,12 @@ def site_predictors(case: Case, placed: PlacedBraid) -> Array:
     )
 
 
-def end_predictors(case: Case, placed: PlacedBraid) -> Array:
-    """Ours of either end (2, 8): its depth in the sac, mm, and the site's shape seen from there."""
-    site = site_predictors(case, placed)[:SHAPE]
-    seen = np.stack([site, site * SITE_MIRROR[:SHAPE]])
+def end_predictors(case: Case, placed: PlacedBraid, site: Array) -> Array:
+    """Ours of either end (2, 8): its depth in the sac, mm, and the site's shape seen from there.
+
+    ``site`` (11,): the case's ``site_predictors``.
+    """
+    seen = np.stack([site[:SHAPE], site[:SHAPE] * SITE_MIRROR[:SHAPE]])
     return np.column_stack([end_depths(case, placed), seen])
 
 

@@ -103,13 +103,15 @@ def _image(braid: Braid) -> NDArray[np.int64] | None:
 
 def _ours(case: Case) -> View:
     placed = placed_braid(case)
-    return View(site_predictors(case, placed), end_predictors(case, placed), placed)
+    site = site_predictors(case, placed)
+    return View(site, end_predictors(case, placed, site), placed)
 
 
 def _paper(case: Case) -> View:
     free = np.broadcast_to(np.eye(3), (case.braid.segments + 1, 3, 3))
     predictors = centreline_predictors(case, CENTRELINE_POINTS)
-    ends = end_predictors(case, placed_braid(case))
+    placed = placed_braid(case)
+    ends = end_predictors(case, placed, site_predictors(case, placed))
     return View(predictors, ends, PlacedBraid(case.braid.positions, free, case.braid.length))
 
 
