@@ -134,13 +134,22 @@ def test_the_picture_shows_something(deployment: Deployment, tmp_path: Path) -> 
 def test_the_results_survive_a_picture_that_fails(
     deployment: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, outcome: Any, says: str
 ) -> None:
-    def run(*_: Any, **__: Any) -> Any:
-        if isinstance(outcome, Exception):
-            raise outcome
-        return outcome
+    class Process:
+        returncode = getattr(outcome, "returncode", None)
+
+        def __init__(self, *_: Any, **__: Any) -> None:
+            pass
+
+        def communicate(self, *_: Any) -> Any:
+            if isinstance(outcome, Exception):
+                raise outcome
+            return outcome.stdout, outcome.stderr
+
+        def poll(self) -> int:
+            return 0
 
     monkeypatch.setattr(picture, "find_spec", lambda name: True)
-    monkeypatch.setattr(subprocess, "run", run)
+    monkeypatch.setattr(subprocess, "Popen", Process)
     written = write_deployment(deployment, tmp_path)
     assert names(tmp_path) == FILES
     assert len(written.notes) == 1 and says in written.notes[0]
@@ -270,7 +279,7 @@ def test_results_can_be_written_from_a_thread(deployment: Deployment, tmp_path: 
 def test_a_disk_too_full_for_the_picture_costs_only_the_picture(
     deployment: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(picture, "pictures_png", lambda *_: [b"x" * 3_000_000])
+    monkeypatch.setattr(picture.Drawer, "draw", lambda *_: [b"x" * 3_000_000])
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (2_500_000, limits[1]))
     try:

@@ -168,7 +168,7 @@ def test_a_picture_that_cannot_be_moved_costs_only_itself(
             raise OSError(28, os.strerror(28))
         move(source, target)
 
-    monkeypatch.setattr(picture, "pictures_png", lambda scenes, surface: [b"1", b"2"])
+    monkeypatch.setattr(picture.Drawer, "draw", lambda *_: [b"1", b"2"])
     monkeypatch.setattr(os, "replace", refuse)
     written = write_prediction(prediction, tmp_path)
     assert written.notes == ["no deployed.png and no deployed_std.png: No space left on device"]

@@ -12,7 +12,6 @@ from braidcast.cli.progress import bars
 from braidcast.cli.table import table
 
 if TYPE_CHECKING:
-    from braidcast.surrogate.model import SurrogateModel
     from braidcast.surrogate.prediction import Prediction
 
 
@@ -49,25 +48,26 @@ def predict(
     Exit codes: 0 done; 1 the results could not be written; 2 bad input; 130 interrupted.
     """
     with told():
-        from braidcast.results_folder import check_folder
-        from braidcast.surrogate.model_file import load_model
-
-        trained = load_model(model)
         folder = f"{case.stem}_predicted" if output is None else output
         if case.suffix.lower() == ".csv":
-            _predict_table(case, trained, folder)
+            _predict_table(case, model, folder)
             return
 
         from braidcast.case import Case
-        from braidcast.surrogate.output import write_prediction
+        from braidcast.deployment.picture import Drawer
+        from braidcast.results_folder import check_folder
 
         given = Case.from_toml(case)
         check_folder(folder)
-        prediction = trained.predict(given)
-        try:
-            written = write_prediction(prediction, folder)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror or str(error), folder) from None
+        with Drawer() as drawer:
+            from braidcast.surrogate.model_file import load_model
+            from braidcast.surrogate.output import write_prediction
+
+            prediction = load_model(model).predict(given)
+            try:
+                written = write_prediction(prediction, folder, drawer=drawer)
+            except OSError as error:
+                raise OSError(error.errno, error.strerror or str(error), folder) from None
         for note in written.notes:
             say(note)
         names = ", ".join(path.name for path in written.files)
@@ -75,11 +75,13 @@ def predict(
         _warn(prediction)
 
 
-def _predict_table(path: Path, trained: SurrogateModel, folder: str) -> None:
+def _predict_table(path: Path, model: Path | None, folder: str) -> None:
     from braidcast.results_folder import check_folder
     from braidcast.surrogate.case_table import read_cases
+    from braidcast.surrogate.model_file import load_model
     from braidcast.surrogate.prediction_table import write_predictions
 
+    trained = load_model(model)
     cases = read_cases(path, trained)
     check_folder(folder)
     with bars("predict", delay=1.0) as progress:

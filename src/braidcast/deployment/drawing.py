@@ -183,6 +183,13 @@ def _unit(vector: Array, otherwise: Array) -> Array:
     return vector / size if size > 1e-9 else otherwise
 
 
+def _main() -> None:
+    import pyvista  # noqa: F401 - meanwhile the other process finds out what to draw
+
+    asked = sys.stdin.buffer.read()
+    if asked:
+        sys.stdout.buffer.write(pickle.dumps(draw(*pickle.loads(asked))))
+
+
 if __name__ == "__main__":
-    pngs = draw(*pickle.load(sys.stdin.buffer))
-    sys.stdout.buffer.write(pickle.dumps(pngs))
+    _main()

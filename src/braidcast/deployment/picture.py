@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,13 +105,17 @@ def shortened(text: str, length: int) -> str:
     return text if len(text) <= length else text[: length - 3] + "..."
 
 
-def add_pictures(scenes: Mapping[str, Scene], surface: Surface, folder: Path) -> Written:
+def add_pictures(
+    scenes: Mapping[str, Scene], surface: Surface, folder: Path, drawer: Drawer | None = None
+) -> Written:
     """Draw the files of these names into ``folder``, or say in a note why they are not there.
 
-    The results are there: a picture is not worth failing for.
+    ``drawer``: a drawing process started before. The results are there: a picture is not worth
+    failing for.
     """
     try:
-        drawn = pictures_png(list(scenes.values()), surface)
+        with drawer or Drawer() as process:
+            drawn = process.draw(list(scenes.values()), surface)
         with workplace(folder) as work:
             for name, png in zip(scenes, drawn, strict=True):
                 (work / name).write_bytes(png)
@@ -123,25 +127,50 @@ def add_pictures(scenes: Mapping[str, Scene], surface: Surface, folder: Path) ->
     return Written([], [f"no {' and no '.join(scenes)}: {reason}"])
 
 
-def pictures_png(scenes: list[Scene], surface: Surface) -> list[bytes]:
-    """Draw each scene in the vessel's ``surface``; PNG bytes.
+class Drawer:
+    """The process that draws. Started before there is anything to draw, it imports VTK meanwhile.
 
-    ``PictureError`` if PyVista is not installed or finds no OpenGL on this machine.
+    Use it in a ``with`` statement: it ends there, whether it has drawn or not.
     """
-    if find_spec("pyvista") is None:
-        raise PictureError("PyVista is not installed: pip install 'braidcast[pictures]'")
-    try:
-        drawn = subprocess.run(
-            [sys.executable, "-m", "braidcast.deployment.drawing"],
-            input=pickle.dumps((scenes, surface)),
-            capture_output=True,
-            timeout=_PATIENCE_SECONDS,
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise PictureError(f"the drawing process failed: {error}") from None
-    if drawn.returncode < 0:
-        raise PictureError("VTK found no OpenGL here: install libegl1, or Mesa's software OpenGL")
-    if drawn.returncode or not drawn.stdout.startswith(pickle.PROTO):
-        said = drawn.stderr.decode(errors="replace").strip().splitlines() or ["no reason given"]
-        raise PictureError(f"the picture could not be drawn: {said[-1]}")
-    return pickle.loads(drawn.stdout)
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._failure = ""
+        if find_spec("pyvista") is None:
+            self._failure = "PyVista is not installed: pip install 'braidcast[pictures]'"
+            return
+        command = [sys.executable, "-m", "braidcast.deployment.drawing"]
+        pipe = subprocess.PIPE
+        try:
+            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe)
+        except OSError as error:
+            self._failure = f"the drawing process failed: {error}"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process is not None and self._process.poll() is None:
+            self._process.kill()
+            self._process.communicate()
+
+    def draw(self, scenes: list[Scene], surface: Surface) -> list[bytes]:
+        """Draw each scene in the vessel's ``surface``, once; PNG bytes.
+
+        ``PictureError`` if PyVista is not installed or finds no OpenGL on this machine.
+        """
+        process = self._process
+        if process is None:
+            raise PictureError(self._failure)
+        try:
+            drawn, said = process.communicate(pickle.dumps((scenes, surface)), _PATIENCE_SECONDS)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise PictureError(f"the drawing process failed: {error}") from None
+        if process.returncode < 0:
+            raise PictureError(
+                "VTK found no OpenGL here: install libegl1, or Mesa's software OpenGL"
+            )
+        if process.returncode or not drawn.startswith(pickle.PROTO):
+            lines = said.decode(errors="replace").strip().splitlines() or ["no reason given"]
+            raise PictureError(f"the picture could not be drawn: {lines[-1]}")
+        return pickle.loads(drawn)

@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from braidcast import __version__
-from braidcast.deployment.picture import Scene, add_pictures, scene, scene_of_gaps, shortened
+from braidcast.deployment.picture import (
+    Drawer,
+    Scene,
+    add_pictures,
+    scene,
+    scene_of_gaps,
+    shortened,
+)
 from braidcast.deployment.vtp import write_polylines
 from braidcast.results_folder import (
     Written,
@@ -28,14 +35,19 @@ _LINE_LENGTH = 120
 
 
 def write_prediction(
-    prediction: Prediction, folder: str | Path, *, picture: bool = True
+    prediction: Prediction,
+    folder: str | Path,
+    *,
+    picture: bool = True,
+    drawer: Drawer | None = None,
 ) -> Written:
     """Write deployed.vtp, vessel.stl, summary.json and two pictures into ``folder``.
 
     deployed.png shows the distance from wire to wall, deployed_std.png the standard deviation of
     the nodes. Results of an earlier run in the same folder are replaced, those of a simulation
-    too. The pictures need ``braidcast[pictures]``; without it a note says so. ``InputError`` if
-    ``folder`` cannot be used, ``OSError`` if the disk is full.
+    too. The pictures need ``braidcast[pictures]``; without it a note says so. ``drawer``: a drawing
+    process started before. ``InputError`` if ``folder`` cannot be used, ``OSError`` if the disk is
+    full.
     """
     check_folder(folder)
     folder = Path(folder)
@@ -49,7 +61,7 @@ def write_prediction(
         files = publish(work, folder)
     if not picture:
         return Written(files, [])
-    drawn = add_pictures(_scenes(prediction), surface, folder)
+    drawn = add_pictures(_scenes(prediction), surface, folder, drawer)
     return Written(files + drawn.files, drawn.notes)
 
 
