@@ -1,13 +1,18 @@
-"""Shared by the tests: a case, and a deployment made up from geometry alone."""
+"""Shared by the tests: a case, a deployment made up from geometry alone, the command."""
 
 import os
 import shutil
+import signal
+import sys
 import tempfile
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from braidcast import cli
 from braidcast.case import Case
 from braidcast.dataset.hypercube import nested_hypercube
 from braidcast.deployment.result import Deployment
@@ -57,6 +62,21 @@ def case(tables: dict[str, Any]) -> Case:
 def deployment(case: Case) -> Deployment:
     """The braid bent along the centreline, just inside the vessel: no mechanics."""
     return bent_along_vessel(case)
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., int]:
+    """Run the command in ``tmp_path`` and return its exit code."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(signal, "signal", lambda *_: signal.SIG_DFL)
+
+    def run(*arguments: str | Path) -> int:
+        monkeypatch.setattr(sys, "argv", ["braidcast", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        return ended.value.code if isinstance(ended.value.code, int) else 0
+
+    return run
 
 
 def bent_along_vessel(case: Case) -> Deployment:

@@ -16,26 +16,11 @@ from typing import Any
 
 import pytest
 
-from braidcast import Case, Deployment, __version__, cli
+from braidcast import Case, Deployment, __version__
 from braidcast.deployment import output, picture
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 Run = Callable[..., int]
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
-    """Run the command in ``tmp_path`` and return its exit code."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(signal, "signal", lambda *_: signal.SIG_DFL)
-
-    def run(*arguments: str | Path) -> int:
-        monkeypatch.setattr(sys, "argv", ["braidcast", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        return ended.value.code if isinstance(ended.value.code, int) else 0
-
-    return run
 
 
 @pytest.fixture

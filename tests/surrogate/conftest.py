@@ -51,7 +51,7 @@ def pretend(case: Case, crimped: Path) -> Deployment:
     """A deployment by that law, without mechanics."""
     braid, positions, placed = case.braid, bulged(case), placed_braid(case)
     zeros = np.zeros(braid.node_count)
-    outcome = "failure" if end_depths(case, placed).max() > 0.0 else "success"
+    outcome = "failure" if end_depths(case, placed.positions).max() > 0.0 else "success"
     return Deployment(
         case=case,
         positions=positions,

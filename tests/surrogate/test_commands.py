@@ -2,8 +2,6 @@
 
 import csv
 import json
-import signal
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 import xarray
 
-from braidcast import Case, cli
+from braidcast import Case
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.deployment import picture
 from braidcast.surrogate.model import SurrogateModel
@@ -26,20 +24,9 @@ COLUMNS = (
 ROW = (15.0, 25.0, 3.0, 7.0, 0.5)
 
 
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
-    """Run the command in ``tmp_path`` and return its exit code; without pictures."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(signal, "signal", lambda *_: signal.SIG_DFL)
+@pytest.fixture(autouse=True)
+def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(picture, "find_spec", lambda _: None)
-
-    def run(*arguments: str | Path) -> int:
-        monkeypatch.setattr(sys, "argv", ["braidcast", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        return ended.value.code if isinstance(ended.value.code, int) else 0
-
-    return run
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import pytest
 
 from braidcast import Case, InputError
 from braidcast.dataset.folder import DatasetFolder
+from braidcast.dataset.plan import Plan
 from braidcast.dataset.work import Job, do_case
 from braidcast.surrogate.evaluate import evaluate
 from braidcast.surrogate.model import SurrogateModel
@@ -190,8 +191,6 @@ def test_failed_and_waiting_cases_are_refused_or_left_out(
 
 
 def test_cases_of_another_plan_are_refused(store: DatasetFolder, tmp_path: Path) -> None:
-    from braidcast.dataset.plan import Plan
-
     plan = Plan.from_text(store.plan.text.replace("seed = 3", "seed = 4"))
     foreign = DatasetFolder.create(plan, tmp_path / "foreign")
     foreign.cases_folder.mkdir()

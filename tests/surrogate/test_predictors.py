@@ -83,7 +83,7 @@ def test_ends_by_hand() -> None:
     assert given.aneurysm_centre is not None
     reach = 3.5 - np.linalg.norm(placed.positions - given.aneurysm_centre, axis=1) - 0.014
     depths = [reach[rings == 0].max(), reach[rings == 70].max()]
-    assert end_depths(given, placed) == pytest.approx(depths, abs=1e-12)
+    assert end_depths(given, placed.positions) == pytest.approx(depths, abs=1e-12)
     found = dict(zip(SITE, site(given), strict=True))
     both = np.exp(np.array(depths) / 2.0)
     assert found["exposure"] == pytest.approx(both.sum())

@@ -32,6 +32,15 @@ def told() -> Iterator[None]:
         sys.exit(NOT_WRITTEN)
 
 
+@contextmanager
+def naming(folder: str) -> Iterator[None]:
+    """Let an ``OSError`` name the folder that was asked for, not the files inside it."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), folder) from None
+
+
 def say(sentence: str) -> None:
     """One sentence to standard error."""
     typer.echo(f"braidcast: {sentence}", err=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from braidcast.cli.messages import say, told
+from braidcast.cli.messages import naming, say, told
 from braidcast.cli.progress import bars
 from braidcast.cli.table import table
 
@@ -64,10 +64,8 @@ def predict(
             from braidcast.surrogate.output import write_prediction
 
             prediction = load_model(model).predict(given)
-            try:
+            with naming(folder):
                 written = write_prediction(prediction, folder, drawer=drawer)
-            except OSError as error:
-                raise OSError(error.errno, error.strerror or str(error), folder) from None
         for note in written.notes:
             say(note)
         names = ", ".join(path.name for path in written.files)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from braidcast.cli.messages import NOT_CONVERGED, say, told
+from braidcast.cli.messages import NOT_CONVERGED, naming, say, told
 from braidcast.cli.progress import bars
 from braidcast.cli.table import table
 
@@ -53,10 +53,8 @@ def simulate(
         # The first run of all compiles for some seconds before it says anything.
         with bars("crimp") as progress:
             deployment = deploy(given, progress=progress, keep_frames=frames)
-        try:
+        with naming(folder):
             written = write_deployment(deployment, folder, frames=frames)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror or str(error), folder) from None
         for note in written.notes:
             say(note)
         typer.echo(_report(deployment, written.files))

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from braidcast.cli.dataset_run import Dataset
 from braidcast.cli.messages import told
 from braidcast.cli.progress import bars
 from braidcast.cli.table import table
 
 if TYPE_CHECKING:
     from braidcast.surrogate.evaluate import Evaluation
-
-Dataset = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a dataset.")]
 
 
 def train(

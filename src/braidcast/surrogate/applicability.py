@@ -51,6 +51,11 @@ def unit(name: str) -> str:
     return "" if name in ("aneurysm_protrusion", "site_eta", "wall_friction") else " mm"
 
 
+def column(name: str) -> str:
+    """The field's name in tables, with its unit: "vessel_diameter_mm", "site_eta"."""
+    return name + unit(name).replace(" ", "_")
+
+
 def fields(case: Case) -> dict[str, float]:
     """The numbers of a case but those of its device, by name; mm and pure numbers.
 

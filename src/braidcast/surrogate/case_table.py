@@ -7,7 +7,7 @@ from typing import Any
 
 from braidcast.case import Case
 from braidcast.errors import InputError
-from braidcast.surrogate.applicability import unit
+from braidcast.surrogate.applicability import column
 from braidcast.surrogate.model import SurrogateModel
 
 IGNORED = ("case", "test", "subset")
@@ -17,7 +17,7 @@ IGNORED = ("case", "test", "subset")
 def columns(model: SurrogateModel) -> dict[str, str]:
     """The field of each column that a table must have: the name with its unit, "_mm" or none."""
     varied = [name for name, (low, high) in model.applicability.limits.items() if low < high]
-    return {name + unit(name).replace(" ", "_"): name for name in varied}
+    return {column(name): name for name in varied}
 
 
 def read_cases(path: str | Path, model: SurrogateModel) -> list[Case]:

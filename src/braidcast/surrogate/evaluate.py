@@ -1,6 +1,5 @@
 """How good a surrogate is on simulations it has not seen, and beside models that know nothing."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -8,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from braidcast.errors import InputError
+from braidcast.results_folder import number
+from braidcast.surrogate.gaussian_process import Progress
 from braidcast.surrogate.metrics import ClassMetrics, Interval, NodeErrors, intervals, share_inside
 from braidcast.surrogate.model import SurrogateModel
 from braidcast.surrogate.placed_braid import placed_braid
@@ -45,9 +46,9 @@ class Evaluation:
         """All of it as plain numbers, for JSON; lengths in mm."""
         shapes = {
             name: {
-                "AE_mm": float(errors.AE.mean()),
+                "AE_mm": errors.AE_p,
                 "AE_std_mm": float(errors.AE.std()),
-                "ME_mm": float(errors.ME.mean()),
+                "ME_mm": errors.ME_p,
                 "ME_std_mm": float(errors.ME.std()),
                 "ME_worst_mm": float(errors.ME.max()),
                 "cases_above_0.15_mm": errors.large,
@@ -60,9 +61,9 @@ class Evaluation:
             "outcomes": {
                 "cases": len(self.success),
                 "threshold": self.threshold,
-                **{name: _finite(value) for name, value in asdict(self.classes).items()},
+                **{name: number(value) for name, value in asdict(self.classes).items()},
                 "intervals_95_percent": {
-                    name: [_finite(end) for end in ends] for name, ends in self.intervals.items()
+                    name: [number(end) for end in ends] for name, ends in self.intervals.items()
                 },
             },
         }
@@ -71,7 +72,7 @@ class Evaluation:
 def evaluate(
     model: SurrogateModel,
     simulations: Simulations,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Evaluation:
     """Predict what the model has not seen: the tests of its own dataset, or all of another.
 
@@ -118,7 +119,3 @@ def evaluate(
 def _nearest(simulations: Simulations, predictions: list[Any], true: Array) -> NodeErrors:
     numbers = [prediction.nearest_case for prediction in predictions]
     return NodeErrors.of(simulations.positions[np.searchsorted(simulations.numbers, numbers)], true)
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None

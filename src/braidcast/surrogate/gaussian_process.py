@@ -17,7 +17,7 @@ counts for its image too.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -63,18 +63,6 @@ class GaussianProcesses:
     offset: Array
     mirror: Array
     parity: Array
-
-    def first(self, count: int) -> "GaussianProcesses":
-        """The first ``count`` of them."""
-        return replace(
-            self,
-            outputs=self.outputs[:, :count],
-            length_scales=self.length_scales[:count],
-            signal=self.signal[:count],
-            noise=self.noise[:count],
-            offset=self.offset[:count],
-            parity=self.parity[:count],
-        )
 
     def predict(self, points: Array) -> Array:
         """Means (m, L) at points (m, p)."""
@@ -225,7 +213,7 @@ def _misfit(
         crossed = (points * (pull @ points)).sum(axis=0)
         along += 2.0 * (pull.sum(axis=1) @ points**2 - view * crossed)
     along *= 0.5 * signal * 5.0 / 3.0
-    gradient[1:-1] = along if len(theta) > 3 or len(along) == 1 else along.sum()
+    gradient[1:-1] = along if len(theta) > 3 else along.sum()
     misfit = 0.5 * observed @ weights + np.log(np.diag(factor)).sum()
     return misfit + 0.5 * len(observed) * np.log(2.0 * np.pi), gradient
 

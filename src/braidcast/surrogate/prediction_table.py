@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from braidcast.atomic import write_atomically
-from braidcast.surrogate.applicability import fields, unit
+from braidcast.surrogate.applicability import column, fields
 from braidcast.surrogate.output import summary
 from braidcast.surrogate.prediction import Prediction
 
@@ -33,10 +33,7 @@ def write_predictions(predictions: Sequence[Prediction], folder: str | Path) -> 
 def _table(predictions: Sequence[Prediction]) -> bytes:
     rows = []
     for number, prediction in enumerate(predictions):
-        numbers = {
-            name + unit(name).replace(" ", "_"): value
-            for name, value in fields(prediction.case).items()
-        }
+        numbers = {column(name): value for name, value in fields(prediction.case).items()}
         found = {k: v for k, v in summary(prediction).items() if k not in _LEFT_OUT}
         found["out_of_range"] = "; ".join(found["out_of_range"])
         rows.append({"case": number, **numbers, **found})

@@ -76,7 +76,7 @@ def site_predictors(case: Case, placed: PlacedBraid) -> Array:
     lean = float(arm @ chord)
     height = float(away[0]) - case.vessel_radius
     middle = case.start_arc_length + 0.5 * case.crimped_length - float(below[0])
-    first, last = np.exp(end_depths(case, placed) / REACH)
+    first, last = np.exp(end_depths(case, placed.positions) / REACH)
     back, ahead = _turns(line.tangent_at_arc_length(below)[0], placed, middle)
     return np.array(
         [
@@ -101,16 +101,17 @@ def end_predictors(case: Case, placed: PlacedBraid, site: Array) -> Array:
     ``site`` (11,): the case's ``site_predictors``.
     """
     seen = np.stack([site[:SHAPE], site[:SHAPE] * SITE_MIRROR[:SHAPE]])
-    return np.column_stack([end_depths(case, placed), seen])
+    return np.column_stack([end_depths(case, placed.positions), seen])
 
 
-def end_depths(case: Case, placed: PlacedBraid) -> Array:
-    """How deep the first and the last ring reach into the sac, (2,) mm, negative outside.
+def end_depths(case: Case, positions: Array) -> Array:
+    """How deep the first and the last ring of nodes (N, 3) reach into the sac, (2,) mm.
 
-    R_a − |C_a − x| − r_w of the deepest node: the paper's failure is a depth of 0 or more.
+    R_a − |C_a − x| − r_w of the deepest node, negative outside: the paper's failure is a depth of
+    0 or more.
     """
     centre, radius = _sac(case)
-    rings = placed.positions.reshape(-1, len(placed.axes), 3)[:, [0, -1]]
+    rings = positions.reshape(-1, case.braid.segments + 1, 3)[:, [0, -1]]
     depth = radius - np.linalg.norm(rings - centre, axis=2) - case.braid.wire_radius
     return depth.max(axis=0)
 

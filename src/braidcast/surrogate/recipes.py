@@ -43,12 +43,12 @@ class View:
 
 @dataclass(frozen=True)
 class Recipe:
-    """``modes`` L, or None to choose it by cross-validation; ``names`` (p,) of the predictors."""
+    """``modes``: numbers L to choose from by cross-validation; ``names`` (p,) of the predictors."""
 
     name: str
     names: tuple[str, ...]
     view: Callable[[Case], View]
-    modes: int | None
+    modes: tuple[int, ...]
     centred: bool
     isotropic: bool
     mirrored: bool
@@ -120,9 +120,11 @@ _CENTRELINE = (
     *("vessel_diameter", "aneurysm_diameter", "y_Ca"),
 )
 
+MODES = (8, 12, 16, 20, 24, 30)
+
 RECIPES = {
-    "ours": Recipe("ours", SITE, _ours, None, centred=True, isotropic=False, mirrored=True),
+    "ours": Recipe("ours", SITE, _ours, MODES, centred=True, isotropic=False, mirrored=True),
     "paper": Recipe(
-        "paper", _CENTRELINE, _paper, 15, centred=False, isotropic=True, mirrored=False
+        "paper", _CENTRELINE, _paper, (15,), centred=False, isotropic=True, mirrored=False
     ),
 }

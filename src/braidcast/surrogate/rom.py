@@ -8,7 +8,6 @@ gives each coefficient from the predictors,
 the diagonal of K_p = V K_L Vᵀ, which is never formed.
 """
 
-from copy import copy
 from dataclasses import dataclass
 from typing import Self
 
@@ -93,21 +92,18 @@ class ReducedOrderModel(RegressorMixin, BaseEstimator):
         points = self._checked(X)
         if not return_std:
             return self.basis_.snapshots(self.processes_.predict(points))
-        mean, std = self.processes_.predict_with_std(points)
-        variance = (std * std) @ self.basis_.modes**2 + self.left_out_
-        return self.basis_.snapshots(mean), np.sqrt(variance)
+        return self.assembled(*self.processes_.predict_with_std(points))
 
-    def truncated(self, modes: int) -> Self:
-        """This fitted model with its first modes only; those dropped count as left out."""
-        check_is_fitted(self)
-        fewer = copy(self)
-        fewer.modes = modes
-        dropped = self.basis_.modes[modes:]
-        energy = (self.processes_.outputs[:, modes:] ** 2).mean(axis=0)
-        fewer.left_out_ = self.left_out_ + energy @ dropped**2
-        fewer.basis_ = self.basis_.truncated(modes)
-        fewer.processes_ = self.processes_.first(modes)
-        return fewer
+    def assembled(self, mean: Array, std: Array) -> tuple[Array, Array]:
+        """Snapshots (m, d) and their standard deviations, of coefficients (m, count).
+
+        With fewer coefficients than modes those dropped count as left out.
+        """
+        count = mean.shape[1]
+        basis, dropped = self.basis_.truncated(count), self.basis_.modes[count:]
+        energy = (self.processes_.outputs[:, count:] ** 2).mean(axis=0)
+        variance = (std * std) @ basis.modes**2 + (self.left_out_ + energy @ dropped**2)
+        return basis.snapshots(mean), np.sqrt(variance)
 
     def sample(self, X: Array, count: int, rng: np.random.Generator) -> Array:
         """Snapshots (count, d) drawn at one set of predictors (1, p) or (p,)."""

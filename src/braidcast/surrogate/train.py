@@ -15,7 +15,7 @@ from braidcast.surrogate.ends import EndsClassifier
 from braidcast.surrogate.evaluate import Evaluation, evaluate
 from braidcast.surrogate.gaussian_process import Progress
 from braidcast.surrogate.model import SurrogateModel
-from braidcast.surrogate.recipes import Recipe, View
+from braidcast.surrogate.recipes import Recipe
 from braidcast.surrogate.thresholds import success_threshold
 from braidcast.surrogate.training_set import Simulations
 from braidcast.surrogate.tuning import tune
@@ -67,20 +67,12 @@ def train(
         applicability.check_device(case)
     data = learned(recipe, simulations, shapes)
     begin = time.process_time()
-    tuning = tune(
-        recipe.reduced_order_model(cases, recipe.modes or 0),
-        data.predictors,
-        data.snapshots,
-        progress,
-        choose=recipe.modes is None,
-    )
+    rom = recipe.reduced_order_model(cases, max(recipe.modes))
+    tuning = tune(rom, data.predictors, data.snapshots, recipe.modes, progress)
     tuned = time.process_time()
-    rom = recipe.reduced_order_model(cases, tuning.modes)
-    rom.fit(data.predictors, data.snapshots, progress)
-    seen: list[View] = [recipe.view(simulations.cases[index]) for index in outcomes]
-    ends = EndsClassifier().fit(
-        np.array([view.ends for view in seen]), simulations.end_in_sac[outcomes]
-    )
+    rom.set_params(modes=tuning.modes).fit(data.predictors, data.snapshots, progress)
+    seen = np.array([recipe.view(simulations.cases[index]).ends for index in outcomes])
+    ends = EndsClassifier().fit(seen, simulations.end_in_sac[outcomes])
     trained = time.process_time()
     return SurrogateModel(
         recipe=recipe,

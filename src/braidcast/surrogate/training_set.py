@@ -11,6 +11,7 @@ from braidcast.dataset.folder import DatasetFolder
 from braidcast.dataset.ledger import Ledger
 from braidcast.dataset.store import dataset
 from braidcast.errors import InputError
+from braidcast.surrogate.predictors import end_depths
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -60,14 +61,14 @@ class Simulations:
             )
         found = dataset(folder, ledger).isel(case=numbers)
         positions = np.asarray(found.positions.values, dtype=np.float64)
-        ends = [_ends_in_sac(case, nodes) for case, nodes in zip(cases, positions, strict=True)]
+        depths = [end_depths(case, nodes) for case, nodes in zip(cases, positions, strict=True)]
         return cls(
             folder.plan_id,
             cases,
             numbers,
             np.array([folder.is_test(k) for k in numbers]),
             positions,
-            np.array(ends),
+            np.array(depths) >= 0.0,
             np.asarray(found.outcome.values == "success"),
             {r.name: (r.low, r.high) for r in folder.plan.ranges},
         )
@@ -92,11 +93,3 @@ class Simulations:
     def classification_tests(self) -> Indices:
         """Indices of the tests."""
         return np.flatnonzero(self.test)
-
-
-def _ends_in_sac(case: Case, positions: Array) -> list[bool]:
-    sac = case.vessel_geometry.aneurysm
-    assert sac is not None
-    rings = positions.reshape(-1, case.braid.segments + 1, 3)[:, [0, -1]]
-    depth = sac.radius - np.linalg.norm(rings - sac.centre, axis=2) - case.braid.wire_radius
-    return [bool(inside) for inside in (depth >= 0.0).any(axis=0)]

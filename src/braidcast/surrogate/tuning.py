@@ -1,5 +1,6 @@
 """Choices made by cross-validation on the training data: how many modes, how wide intervals are."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 
@@ -13,9 +14,6 @@ from braidcast.surrogate.metrics import NodeErrors
 from braidcast.surrogate.rom import ReducedOrderModel
 
 Array = NDArray[np.float64]
-
-MODES = (8, 12, 16, 20, 24, 30)
-"""Numbers of modes to choose from."""
 
 FOLDS = 5
 
@@ -40,28 +38,26 @@ def tune(
     model: ReducedOrderModel,
     predictors: Array,
     snapshots: Array,
+    counts: Sequence[int],
     progress: Progress | None = None,
-    *,
-    choose: bool = True,
 ) -> Tuning:
     """Cross-validate ``model`` on predictors (n, p) and snapshots (n, 3N).
 
-    Modes are independent, so that one fit with the most of them serves fewer too. Without
-    ``choose`` the number of modes stays the model's.
+    ``counts``: the numbers of modes to choose from. Modes are independent, so that one fit with
+    the most of them serves fewer too.
     """
-    most = max(MODES) if choose else model.modes
-    counts = [count for count in MODES if count < most] if choose else []
     folds = KFold(min(FOLDS, len(predictors)), shuffle=True, random_state=0)
-    errors: dict[int, list[NodeErrors]] = {count: [] for count in (*counts, most)}
-    ratios: dict[int, list[Array]] = {count: [] for count in (*counts, most)}
+    errors: dict[int, list[NodeErrors]] = {count: [] for count in counts}
+    ratios: dict[int, list[Array]] = {count: [] for count in counts}
     for done, (train, test) in enumerate(folds.split(predictors)):
         if progress:
             progress("tune", done / folds.n_splits)
-        fitted = clone(model).set_params(modes=most).fit(predictors[train], snapshots[train])
-        for count in errors:
-            mean, std = fitted.truncated(count).predict(predictors[test], return_std=True)
-            true = snapshots[test]
-            shape = (len(test), -1, 3)
+        fitted = clone(model).set_params(modes=max(counts))
+        fitted.fit(predictors[train], snapshots[train])
+        points, true, shape = predictors[test], snapshots[test], (len(test), -1, 3)
+        coefficients, spread = fitted.processes_.predict_with_std(fitted.standardised(points))
+        for count in counts:
+            mean, std = fitted.assembled(coefficients[:, :count], spread[:, :count])
             errors[count].append(NodeErrors.of(mean.reshape(shape), true.reshape(shape)))
             ratios[count].append(np.abs(mean - true).ravel() / std.ravel())
     if progress:
