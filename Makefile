@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # More BLAS threads than cores make two test workers slower, not faster.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
-.PHONY: help demo study test lint types format clean
+.PHONY: help demo study test lint types docs format clean
 .NOTPARALLEL:
 
 help:
@@ -16,6 +16,7 @@ help:
 	@echo "make test    install and run the tests"
 	@echo "make lint    ruff: rules and layout"
 	@echo "make types   mypy"
+	@echo "make docs    Sphinx: the site, from docs/ into docs/_build/html"
 	@echo "make format  let ruff lay the sources out"
 	@echo "make clean   remove $(VENV), demo/ and caches"
 
@@ -35,12 +36,15 @@ lint: $(VENV)/.installed-dev
 types: $(VENV)/.installed-dev
 	$(BIN)/mypy
 
+docs: $(VENV)/.installed-docs
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
 format: $(VENV)/.installed-dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) demo .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) demo docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
