@@ -12,7 +12,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_N
 
 help:
 	@echo "make demo    install braidcast in $(VENV) and simulate examples/success.toml into demo/"
-	@echo "make study   install and simulate the 900 cases of study/plan.toml, or what is missing of them"
+	@echo "make study   install and simulate the 900 cases of the study, or what is missing of them"
 	@echo "make test    install and run the tests"
 	@echo "make lint    ruff: rules and layout"
 	@echo "make types   mypy"

@@ -30,9 +30,9 @@ from braidcast.dataset.home import data_folder
 from braidcast.dataset.ledger import Ledger
 from braidcast.deployment.release import ReleaseOptions
 from braidcast.deployment.simulate import simulate
+from braidcast.study import PLAN
 from deployment import ONE_THREAD, cholesky_seconds
 
-STUDY = Path(__file__).parents[1] / "study" / "plan.toml"
 KILLS = 5
 COMMAND = [sys.executable, "-m", "braidcast", "dataset"]
 
@@ -43,7 +43,7 @@ def planned(name: str, cases: int, home: Path) -> Path:
     """A dataset folder of the study's plan with fewer cases."""
     folder, plan = home / name, home / f"{name}.toml"
     if not folder.exists():
-        text = re.sub(r"(?m)^cases = .*$", f"cases = {cases}", STUDY.read_text(encoding="utf-8"))
+        text = re.sub(r"(?m)^cases = .*$", f"cases = {cases}", PLAN.read_text(encoding="utf-8"))
         text = re.sub(r"(?m)^(subsets|tests) = .*\n", "", text)
         plan.write_text(text, encoding="utf-8")
         subprocess.run([*COMMAND, "create", str(plan), "-o", str(folder)], check=True)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import braidcast
 from braidcast.dataset.home import data_folder
+from braidcast.study import PLAN
 
 HERE = Path(__file__).parent
 CASES = HERE / "cases.csv"
@@ -39,7 +40,7 @@ def simulate() -> int:
     folder = data_folder()
     folder.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "braidcast", "dataset"]
-    create = [*command, "create", str(HERE / "plan.toml"), "-o", str(folder / "study")]
+    create = [*command, "create", str(PLAN), "-o", str(folder / "study")]
     run = [*command, "run", str(folder / "study")]
     return subprocess.run(create).returncode or subprocess.run(run).returncode
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from braidcast import Case, InputError
 from braidcast.case_toml import toml_text
 from braidcast.dataset.plan import Plan, Range
+from braidcast.study import PLAN
 
 HOME = Path(__file__).parents[2]
 
@@ -42,7 +43,7 @@ def complaint(text: str) -> str:
 
 
 def test_the_example_is_the_study() -> None:
-    plan = Plan.from_toml(HOME / "study" / "plan.toml")
+    plan = Plan.from_toml(PLAN)
     assert (plan.cases, plan.subsets, plan.tests) == (900, (150, 300, 600), 100)
     assert [(p.column, p.low, p.high) for p in plan.ranges] == [
         ("vessel_P1_y_mm", 10.0, 30.0),

@@ -9,6 +9,7 @@ import pytest
 from braidcast.dataset.draw import draw
 from braidcast.dataset.home import data_folder
 from braidcast.dataset.plan import Plan
+from braidcast.study import PLAN
 
 STUDY = Path(__file__).parents[2] / "study"
 
@@ -21,7 +22,7 @@ def rows() -> list[dict[str, str]]:
 
 @pytest.mark.slow
 def test_its_cases_are_drawn_from_its_plan(rows: list[dict[str, str]]) -> None:
-    plan = Plan.from_toml(STUDY / "plan.toml")
+    plan = Plan.from_toml(PLAN)
     names = [parameter.name for parameter in plan.ranges]
     kept = np.array([[float(row[name]) for name in names] for row in rows])
     np.testing.assert_allclose(draw(plan).values, kept, rtol=1e-12)

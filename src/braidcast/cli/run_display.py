@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from braidcast.cli.messages import say
 
 if TYPE_CHECKING:
     from braidcast.dataset.progress import Progress
+    from braidcast.study.stages import Done
 
 #: Seconds between two lines where there is no terminal.
 _EVERY = 30.0
@@ -61,6 +62,31 @@ def run_display() -> Iterator[RunDisplay]:
     shown = RunDisplay(sys.stderr.isatty())
     with shown.bars:
         yield shown
+
+
+class StageDisplay(RunDisplay):
+    """The same for the stages of a study: one line on a terminal, elsewhere one a stage."""
+
+    def __init__(self, terminal: bool, stages: int) -> None:
+        super().__init__(terminal)
+        self.bars.update(self._bar, description="stages", total=stages)
+        self._stages = stages
+
+    def show(self, done: Done, left: int) -> None:
+        """A stage is done, ``left`` are not."""
+        reached = self._stages - left
+        if self._terminal:
+            self.bars.update(self._bar, description=done.name, completed=reached)
+        elif done.again:
+            say(f"{reached}/{self._stages}, {done.name}: {done.wall_seconds:.1f} s")
+
+
+@contextmanager
+def stage_display(stages: int) -> Iterator[Callable[[Done, int], None]]:
+    """What is to be told of every stage that is done, on the screen as long as it lasts."""
+    shown = StageDisplay(sys.stderr.isatty(), stages)
+    with shown.bars:
+        yield shown.show
 
 
 def _line(progress: Progress) -> str:

@@ -42,6 +42,15 @@ class Ledger:
                 records[index] = record
         return cls(len(folder), records, damaged)
 
+    def first(self, cases: int | None) -> Ledger:
+        """Of the first ``cases`` alone; of all if None."""
+        if cases is None:
+            return self
+        count = min(cases, self.cases)
+        records = {index: record for index, record in self.records.items() if index < count}
+        damaged = {index: why for index, why in self.damaged.items() if index < count}
+        return Ledger(count, records, damaged)
+
     @property
     def finished(self) -> list[CaseRecord]:
         return [record for record in self.records.values() if record.finished]

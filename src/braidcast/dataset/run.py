@@ -47,11 +47,14 @@ def run(
     workers: int | None = None,
     scheduler: str | None = None,
     retry_failed: bool = False,
+    cases: int | None = None,
     deploy: Deploy = by_finite_elements,
     progress: Callable[[Progress], None] = lambda progress: None,
     say: Callable[[str], None] = lambda sentence: None,
 ) -> RunReport:
     """Simulate every case without a result; the results are the case files of the folder.
+
+    ``cases``: only the first so many; a later run goes on from there.
 
     ``workers`` new processes of one thread each, by default one a core; or the Dask cluster whose
     ``scheduler`` is at this address. Failed cases stay failed unless ``retry_failed``. ``say`` is
@@ -64,14 +67,14 @@ def run(
     begin = time.perf_counter()
     with folder.lock():
         _remove_leftovers(folder)
-        ledger = Ledger.read(folder)
+        ledger = Ledger.read(folder).first(cases)
         for sentence in ledger.damaged.values():
             say(f"{sentence}; it is done again")
         others = sum(record.versions != code_versions() for record in ledger.finished)
         if others:
             say(f"{others} cases were finished by other versions than {code_versions()}")
         kept = {i: r for i, r in ledger.records.items() if r.finished or not retry_failed}
-        waiting = [index for index in range(len(folder)) if index not in kept]
+        waiting = [index for index in range(ledger.cases) if index not in kept]
         if not waiting:
             return RunReport((), 0.0, 0)
         folder.cases_folder.mkdir(exist_ok=True)
@@ -84,7 +87,7 @@ def run(
                 if deploy is by_finite_elements:
                     say("compiling and crimping, once for all workers")
                     _prepare(folder, waiting[0])
-                count = Count(len(folder), good, len(kept) - good, len(waiting))
+                count = Count(ledger.cases, good, len(kept) - good, len(waiting))
                 progress(count.progress(_threads(client)))
                 for done in _work_off(client, folder, job, waiting):
                     count.add(done)

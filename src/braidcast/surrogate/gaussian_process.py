@@ -79,6 +79,16 @@ class GaussianProcesses:
         variance = prior - _explained(self._inverses, covariance)
         return mean, np.sqrt(np.maximum(variance, 0.0))
 
+    def leave_one_out(self) -> Array:
+        """Outputs (n, L) less what all other observations say of them.
+
+        [K⁻¹ y]_i / [K⁻¹]_ii with K the covariance of the observations (Rasmussen & Williams 2006,
+        equation 5.12); the hyper-parameters stay.
+        """
+        inverses = (dtrtri(factor, lower=True)[0] for factor in self._factors)
+        diagonals = [(np.tril(inverse) ** 2).sum(axis=0) for inverse in inverses]
+        return self.weights / np.stack(diagonals, axis=1)
+
     def _mean(self, covariance: Array) -> Array:
         return self.offset + np.einsum("mnl,nl->ml", covariance, self.weights)
 

@@ -37,13 +37,16 @@ class Simulations:
     """The plan's ranges, by the field's name."""
 
     @classmethod
-    def of(cls, folder: DatasetFolder, *, finished_only: bool = False) -> Self:
-        """Read a dataset folder.
+    def of(
+        cls, folder: DatasetFolder, *, finished_only: bool = False, cases: int | None = None
+    ) -> Self:
+        """Read a dataset folder, or its first ``cases``.
 
         ``InputError`` if a case has failed or waits, unless ``finished_only`` leaves them out, if
         none is finished, or if a case has no aneurysm.
         """
-        ledger = Ledger.read(folder)
+        everything = Ledger.read(folder)
+        ledger = everything.first(cases)
         failed, waiting = len(ledger.failed), ledger.waiting
         if (failed or waiting) and not finished_only:
             raise InputError(
@@ -54,17 +57,17 @@ class Simulations:
         numbers = np.array(sorted(k for k, r in ledger.records.items() if r.finished), dtype=int)
         if not len(numbers):
             raise InputError(f"dataset folder = {folder.path} has no finished case, must have some")
-        cases = tuple(folder.case(k) for k in numbers)
-        if any(case.aneurysm is None for case in cases):
+        described = tuple(folder.case(k) for k in numbers)
+        if any(case.aneurysm is None for case in described):
             raise InputError(
                 f"dataset folder = {folder.path} has cases without [aneurysm], must have one in all"
             )
-        found = dataset(folder, ledger).isel(case=numbers)
+        found = dataset(folder, everything).isel(case=numbers)
         positions = np.asarray(found.positions.values, dtype=np.float64)
-        depths = [end_depths(case, nodes) for case, nodes in zip(cases, positions, strict=True)]
+        depths = [end_depths(case, nodes) for case, nodes in zip(described, positions, strict=True)]
         return cls(
             folder.plan_id,
-            cases,
+            described,
             numbers,
             np.array([folder.is_test(k) for k in numbers]),
             positions,

@@ -1,0 +1,1 @@
+"""The report's diagrams, by matplotlib, from the study's tables."""
