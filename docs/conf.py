@@ -1,8 +1,11 @@
 """Sphinx: the site is built by ``make docs``."""
 
+import numpy as np
 from docutils import nodes
 from docutils.parsers.rst import Directive
+from numpy.typing import ArrayLike, NDArray
 from sphinx.application import Sphinx
+from sphinx.util.typing import stringify_annotation
 from typer.main import get_command
 from typer.testing import CliRunner
 
@@ -26,10 +29,11 @@ html_copy_source = False
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {"Array": "Array"}
 
 
 class CommandLine(Directive):
-    """The ``--help`` of every command of braidcast, so that the page cannot be behind it."""
+    """What every command says of itself, so that the page cannot be behind the program."""
 
     def run(self) -> list[nodes.Node]:
         return [self._section(path) for path in _commands(get_command(app), ())]
@@ -49,13 +53,33 @@ def _commands(command: object, path: tuple[str, ...]) -> list[tuple[str, ...]]:
     return [path, *(p for name in inner for p in _commands(inner[name], (*path, name)))]
 
 
-def _bars(*arguments: object) -> None:
-    """Docstrings have |x| for a length, which reStructuredText takes for a substitution."""
-    lines = arguments[-1]
-    assert isinstance(lines, list)
+LONG = {
+    stringify_annotation(kind, "smart"): name
+    for kind, name in (
+        (ArrayLike, "ArrayLike"),
+        (NDArray[np.float64], "NDArray[float64]"),
+        (NDArray[np.int64], "NDArray[int64]"),
+    )
+}
+
+
+def _signature(app: Sphinx, what: str, name: str, thing: object, options: object, *texts: str):
+    """NumPy's types under the names that the sources give them, not all that they stand for."""
+    for long, short in LONG.items():
+        texts = tuple(text and text.replace(long, short) for text in texts)
+    return texts
+
+
+def _docstring(
+    app: Sphinx, what: str, name: str, thing: object, options: object, lines: list[str]
+) -> None:
+    """A page introduces its modules; |x| is a length, and no substitution of reStructuredText."""
+    if what == "module":
+        lines.clear()
     lines[:] = [line if line.startswith("    ") else line.replace("|", "\\|") for line in lines]
 
 
 def setup(app: Sphinx) -> None:
-    app.connect("autodoc-process-docstring", _bars)
+    app.connect("autodoc-process-signature", _signature)
+    app.connect("autodoc-process-docstring", _docstring)
     app.add_directive("command-line", CommandLine)
