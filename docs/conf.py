@@ -63,7 +63,9 @@ LONG = {
 }
 
 
-def _signature(app: Sphinx, what: str, name: str, thing: object, options: object, *texts: str):
+def _signature(
+    app: Sphinx, what: str, name: str, thing: object, options: object, *texts: str | None
+) -> tuple[str | None, ...]:
     """NumPy's types under the names that the sources give them, not all that they stand for."""
     for long, short in LONG.items():
         texts = tuple(text and text.replace(long, short) for text in texts)
