@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 #: Wires are 28 µm thick: at their own size most would be thinner than a pixel.
 MAGNIFICATION = 2.0
 SIZE = (1600, 900)
+BARE_SIZE = (1200, 750)
+BARE_BAND = (0.09, 0.98)
+MARK = "#D55E00"
 #: Where stent and sac may be, as shares of the picture's height: scale below, caption above.
 BELOW, ABOVE = 0.16, 0.86
 #: Height of a line of small print, as a share of the picture's height.
@@ -31,10 +34,11 @@ def draw(scenes: list[Scene], surface: Surface) -> list[bytes]:
     """PNG bytes of each scene, at the risk of this process's life."""
     import pyvista
 
-    vertices, triangles = surface
-    faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
-    vessel = pyvista.PolyData(np.asarray(vertices, dtype=np.float64), faces)
-    return [_png(_image(scene, vessel)) for scene in scenes]
+    def mesh(vertices: Array, triangles: NDArray[np.int64]) -> pyvista.PolyData:
+        faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
+        return pyvista.PolyData(np.asarray(vertices, dtype=np.float64), faces)
+
+    return [_png(_image(scene, mesh(*(scene.surface or surface)))) for scene in scenes]
 
 
 def _png(image: NDArray[np.uint8]) -> bytes:
@@ -49,20 +53,22 @@ def _image(scene: Scene, vessel: pyvista.PolyData) -> NDArray[np.uint8]:
     """Red, green and blue of each pixel, (height, width, 3)."""
     import pyvista
 
-    plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE))
+    size = BARE_SIZE if scene.bare else SIZE
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
     try:
         plotter.set_background("white")
         plotter.enable_parallel_projection()
         plotter.enable_depth_peeling(8)
         plotter.enable_anti_aliasing("ssaa")
-        plotter.add_mesh(
-            vessel,
-            color="#d9a08f",
-            opacity=0.25,
-            smooth_shading=True,
-            split_sharp_edges=True,
-            specular=0.2,
-        )
+        if vessel.n_points:
+            plotter.add_mesh(
+                vessel,
+                color="#d9a08f",
+                opacity=0.25,
+                smooth_shading=True,
+                split_sharp_edges=True,
+                specular=0.2,
+            )
         wires = polydata(scene.positions, scene.wires, {"value": scene.values})
         plotter.add_mesh(
             wires.tube(radius=MAGNIFICATION * scene.wire_radius, n_sides=8),
@@ -70,6 +76,7 @@ def _image(scene: Scene, vessel: pyvista.PolyData) -> NDArray[np.uint8]:
             clim=scene.limits,
             cmap="viridis",
             smooth_shading=True,
+            show_scalar_bar=not scene.bare,
             scalar_bar_args={
                 "title": f"{scene.legend}\n",
                 "color": "black",
@@ -83,6 +90,12 @@ def _image(scene: Scene, vessel: pyvista.PolyData) -> NDArray[np.uint8]:
                 "label_font_size": 22,
             },
         )
+        if scene.bare:
+            _add_marks(plotter, scene)
+            view = _view(scene, *BARE_BAND, size)
+            _aim(plotter, view)
+            _add_ruler(plotter, view, size, 20)
+            return np.asarray(plotter.screenshot(return_img=True))
         lines = [*scene.lines, f"wires drawn {MAGNIFICATION:g} times as thick as they are"]
         lower = LINE * (len(lines) - 2)  # where there are more lines than usual
         for text, height, size in (
@@ -97,9 +110,9 @@ def _image(scene: Scene, vessel: pyvista.PolyData) -> NDArray[np.uint8]:
                 color="black",
                 shadow=False,
             )
-        view = _view(scene, ABOVE - lower)
+        view = _view(scene, BELOW, ABOVE - lower, size)
         _aim(plotter, view)
-        _add_ruler(plotter, view)
+        _add_ruler(plotter, view, size, 12)
         return np.asarray(plotter.screenshot(return_img=True))
     finally:
         plotter.close()
@@ -124,8 +137,8 @@ class _View(NamedTuple):
     half_height: float
 
 
-def _view(scene: Scene, above: float) -> _View:
-    """At right angles to the vessel's plane, stent and sac filling the height below ``above``."""
+def _view(scene: Scene, below: float, above: float, size: tuple[int, int]) -> _View:
+    """At right angles to the vessel's plane, stent and sac filling the height between the two."""
     shown = scene.positions
     along = _unit(scene.along, np.array([0.0, 0.0, 1.0]))
     upward = scene.upward - (scene.upward @ along) * along
@@ -145,9 +158,9 @@ def _view(scene: Scene, above: float) -> _View:
         flat = np.concatenate([flat, [sac - radius, sac + radius]])
     low, high = flat.min(axis=0), flat.max(axis=0)
     width, height = high - low
-    half = max(0.5 * height / (above - BELOW), 0.5 * width * SIZE[1] / SIZE[0] / 0.92)
+    half = max(0.5 * height / (above - below), 0.5 * width * size[1] / size[0] / 0.92)
     # The middle of the free band between caption and scale is not the middle of the picture.
-    off = np.array([0.0, (1.0 - above - BELOW) * half])
+    off = np.array([0.0, (1.0 - above - below) * half])
     centre = (0.5 * (low + high) + off) @ frame + (shown @ eye).mean() * eye
     return _View(right, top, eye, centre, half)
 
@@ -161,11 +174,28 @@ def _aim(plotter: pyvista.Plotter, view: _View) -> None:
     plotter.reset_camera_clipping_range()
 
 
-def _add_ruler(plotter: pyvista.Plotter, view: _View) -> None:
+def _add_marks(plotter: pyvista.Plotter, scene: Scene) -> None:
+    """Marked nodes as balls, and curves as lines."""
+    import pyvista
+
+    if scene.marked is not None and len(scene.marked):
+        balls = pyvista.PolyData(scene.positions[scene.marked]).glyph(
+            geom=pyvista.Sphere(radius=5.0 * scene.wire_radius), scale=False, orient=False
+        )
+        plotter.add_mesh(balls, color=MARK)
+    for curve in scene.curves:
+        plotter.add_mesh(
+            pyvista.MultipleLines(curve), color=MARK, line_width=4, render_lines_as_tubes=True
+        )
+
+
+def _add_ruler(
+    plotter: pyvista.Plotter, view: _View, size: tuple[int, int], font_size: int
+) -> None:
     """A line as long as a round number of millimetres, with that number, at the lower left."""
     import pyvista
 
-    half = view.half_height * np.array([SIZE[0] / SIZE[1], 1.0])
+    half = view.half_height * np.array([size[0] / size[1], 1.0])
     length = max(n for n in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if n <= max(0.1, half[0] / 2))
     left, low = -0.97 * half[0], -0.88 * half[1]
     # Nearer to the eye than anything else, so that nothing hides it.
@@ -173,7 +203,11 @@ def _add_ruler(plotter: pyvista.Plotter, view: _View) -> None:
     ends = plane + left * view.right, plane + (left + length) * view.right
     plotter.add_mesh(pyvista.Line(*ends), color="black", line_width=4, lighting=False)
     plotter.add_text(
-        f"{length:g} mm", position=(0.015, 0.015), viewport=True, font_size=12, color="black"
+        f"{length:g} mm",
+        position=(0.015, 0.015),
+        viewport=True,
+        font_size=font_size,
+        color="black",
     )
     plotter.reset_camera_clipping_range()
 

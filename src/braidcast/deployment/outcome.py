@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from braidcast.case import Case
 from braidcast.mechanics.rotations import Array
@@ -29,11 +30,7 @@ def outcome(case: Case, positions: Array, wire_distance: Array) -> Outcome:
     """
     braid = case.braid
     ends = np.array(braid.end_nodes)
-    in_sac = np.zeros(len(ends), dtype=bool)
-    sac = case.vessel_geometry.aneurysm
-    if sac is not None:
-        depth = sac.radius - np.linalg.norm(positions[ends] - sac.centre, axis=1)
-        in_sac = depth - braid.wire_radius >= 0.0
+    in_sac = np.isin(ends, end_nodes_in_sac(case, positions))
     parent = case.vessel_geometry.tube
     off_parent = np.abs(parent.distance(positions[ends]) + braid.wire_radius) > APPOSED
     rings = np.array(braid.rings)[ends]
@@ -43,6 +40,15 @@ def outcome(case: Case, positions: Array, wire_distance: Array) -> Outcome:
     failed = bool(in_sac.any())
     failed_clinically = bool((in_sac & off_parent).any()) or standing_off
     return Outcome(_word(failed), _word(failed_clinically), int(in_sac.sum()))
+
+
+def end_nodes_in_sac(case: Case, positions: Array) -> NDArray[np.int64]:
+    """Nodes (k,) of the end rings that lie in the sac, of a deployed shape (N, 3) mm."""
+    ends, sac = np.array(case.braid.end_nodes), case.vessel_geometry.aneurysm
+    if sac is None:
+        return ends[:0]
+    depth = sac.radius - np.linalg.norm(positions[ends] - sac.centre, axis=1)
+    return ends[depth - case.braid.wire_radius >= 0.0]
 
 
 def _word(failed: bool) -> str:

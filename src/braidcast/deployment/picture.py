@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from braidcast.results_folder import Written, add, workplace
 
 if TYPE_CHECKING:
+    from braidcast.case import Case
     from braidcast.deployment.shape import DeployedBraid
 
 Array = NDArray[np.float64]
@@ -62,17 +63,27 @@ class Scene:
     """To the side of the vessel that is shown above, (3,)."""
     sac: tuple[Array, float] | None
     """Centre (3,) and radius of the sac, shown as a whole."""
+    bare: bool = False
+    """Braid, vessel and ruler alone: no text, no scale, for whoever puts them around it."""
+    surface: Surface | None = None
+    """The vessel of this scene, if it is another than that of the others."""
+    marked: NDArray[np.int64] | None = None
+    """Nodes (k,) to be seen at once, drawn as balls."""
+    curves: tuple[Array, ...] = ()
+    """Lines (n, 3), mm, drawn over all else."""
 
 
 def scene(
-    braid: DeployedBraid,
+    case: Case,
+    positions: Array,
     values: Array,
     legend: str,
     limits: tuple[float, float],
     lines: tuple[str, ...],
 ) -> Scene:
-    """The braid with values (N,) at its nodes, seen with the sac upwards."""
-    case = braid.case
+    """The braid of a case at nodes (N, 3) mm with values (N,), seen with the sac upwards."""
+    from braidcast.deployment.shape import nodes_of_wires  # not for the process that draws
+
     centreline, sac = case.centreline, case.vessel_geometry.aneurysm
     if sac is not None:
         upward = sac.centre - centreline.at_arc_length(centreline.length / 2.0)[0]
@@ -80,8 +91,8 @@ def scene(
         upward = centreline.P1 - 0.5 * (centreline.P0 + centreline.P2)
     title = " ".join(case.title.split()) or "Deployed stent"
     return Scene(
-        positions=braid.positions,
-        wires=braid.wires,
+        positions=positions,
+        wires=nodes_of_wires(case.braid),
         wire_radius=case.braid.wire_radius,
         values=values,
         legend=legend,
@@ -97,7 +108,7 @@ def scene(
 def scene_of_gaps(braid: DeployedBraid, lines: tuple[str, ...]) -> Scene:
     """The braid coloured by the free space between wire and wall."""
     legend = f"distance from wire to wall (mm; yellow: {FARTHEST:g} mm or more)"
-    return scene(braid, braid.wire_distance, legend, (0.0, FARTHEST), lines)
+    return scene(braid.case, braid.positions, braid.wire_distance, legend, (0.0, FARTHEST), lines)
 
 
 def shortened(text: str, length: int) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from braidcast.deployment.outcome import end_nodes
+from braidcast.deployment.outcome import end_nodes_in_sac
 from braidcast.study import pictures, vessel_figure
 from braidcast.study.plots import insight, outcomes, shapes, workflow
 from braidcast.study.sizes import Size
@@ -23,7 +23,7 @@ def stages(sizes: Sequence[Size], middle: Size, samples: int) -> list[Stage]:
     return [
         Stage("figure workflow", workflow.workflow),
         Stage("figure strategy", strategy, needs=("strategy",)),
-        Stage("figure vessel", vessel, needs=("strategy",)),
+        Stage("figure vessel", vessel_figure.vessel, needs=("strategy",)),
         Stage("figure sites", sites, needs=("sites",)),
         Stage("figure site probability", outcomes.sites, needs=("sites",)),
         Stage("figure confusion", outcomes.confusion, at, ("table 2",)),
@@ -57,13 +57,6 @@ def strategy(study: Study) -> list[str]:
     return [name]
 
 
-def vessel(study: Study) -> list[str]:
-    """The parametric vessel and a section of its distance field (paper, Figure 3)."""
-    name = "figures/vessel.svg"
-    vessel_figure.vessel_figure(study.place(name), case_of(study.arrays("strategy")["case"]))
-    return [name]
-
-
 def sites(study: Study) -> list[str]:
     """A failure and a success of one vessel (paper, Figure 4)."""
     data, table = study.arrays("sites"), study.table("sites")
@@ -72,7 +65,7 @@ def sites(study: Study) -> list[str]:
     for eta in SHOWN_SITES:
         row = int(np.abs(table["eta"] - eta).argmin())
         positions = data["positions"][row]
-        inside = end_nodes(case, positions)
+        inside = end_nodes_in_sac(case, positions)
         title = f"η = {table['eta'][row]:.1f}: {table['outcome'][row]}"
         panels.append(pictures.Panel(case, positions, title, mark=inside))
     name = "figures/sites.png"
@@ -91,9 +84,7 @@ def false_negatives(study: Study, samples: int) -> list[str]:
         index = int(np.searchsorted(simulations.numbers, int(row["case"])))
         title = f"case {row['case']:.0f}: P = {row['success_probability']:.2f}"
         title += f", end {row['gap_mm']:.2f} mm from the sac"
-        panels.append(
-            pictures.Panel(simulations.cases[index], simulations.positions[index], title)
-        )
+        panels.append(pictures.Panel(simulations.cases[index], simulations.positions[index], title))
     name = "figures/false_negatives.png"
     pictures.braids_figure(study.place(name), panels, columns=2)
     return [name]
@@ -117,8 +108,6 @@ def examples(study: Study, samples: int) -> list[str]:
         limits = 0.0, float(f"{np.quantile(error, 0.999):.1g}")
         name = f"figures/examples_{recipe}.png"
         legend = "distance from the simulated node (mm)"
-        pictures.braids_figure(
-            study.place(name), panels, legend=legend, limits=limits, columns=2
-        )
+        pictures.braids_figure(study.place(name), panels, legend=legend, limits=limits, columns=2)
         written.append(name)
     return written

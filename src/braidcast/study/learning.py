@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from braidcast.study.outcomes import OURS, probabilities, threshold
+from braidcast.study.outcomes import probabilities, threshold
 from braidcast.study.workspace import Study
 from braidcast.surrogate.metrics import NodeErrors
 from braidcast.surrogate.recipes import RECIPES

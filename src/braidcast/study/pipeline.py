@@ -45,7 +45,7 @@ def pipeline(study: Study, samples: int) -> list[Stage]:
     ):
         stages.append(Stage(name, stage, {"samples": samples}, needs, samples))
     everything = tuple(stage.name for stage in stages)
-    drawn = figures.stages(stages, sizes, middle, samples)
+    drawn = figures.stages(sizes, middle, samples)
     written = Stage(
         "report",
         report.write,

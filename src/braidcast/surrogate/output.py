@@ -94,7 +94,9 @@ def _scenes(prediction: Prediction) -> dict[str, Scene]:
     lines, std = _caption(prediction), prediction.std_norm
     return {
         "deployed.png": scene_of_gaps(prediction, lines),
-        "deployed_std.png": scene(prediction, std, _STD_LEGEND, (0.0, _scale_end(std)), lines),
+        "deployed_std.png": scene(
+            prediction.case, prediction.positions, std, _STD_LEGEND, (0.0, _scale_end(std)), lines
+        ),
     }
 
 

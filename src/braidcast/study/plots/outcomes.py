@@ -30,7 +30,9 @@ def confusion(study: Study, size: Size) -> list[str]:
         axis.tick_params(length=0, labelsize=8)
         axis.grid(False)
         axis.spines[:].set_visible(False)
-        style.titled(axis, {OURS: "ours: ends", "support vector machine": "support vectors"}.get(name, name))
+        style.titled(
+            axis, {OURS: "ours: ends", "support vector machine": "support vectors"}.get(name, name)
+        )
     for axis in axes[len(NAMES) :]:
         axis.remove()
     return [style.save(study, figure, "confusion")]
@@ -79,7 +81,9 @@ def classifiers(study: Study, sizes: Sequence[Size]) -> list[str]:
                 axis.plot(value[metric], y, "o", color=shade, ms=4)
                 if value["paper_consistent"] == True:  # noqa: E712 - nan is neither
                     axis.plot(value[f"paper_{metric}"], y, "x", color="black", ms=4, mew=1)
-        axis.set_yticks(range(len(names)), [n if n != OURS else "ours: ends" for n in reversed(names)])
+        axis.set_yticks(
+            range(len(names)), [n if n != OURS else "ours: ends" for n in reversed(names)]
+        )
         axis.xaxis.set_major_formatter(style.percent())
         axis.set_xlabel(metric)
         axis.set_xlim(0.0 if metric == "specificity" else 0.6, 1.02)
@@ -105,7 +109,9 @@ def sites(study: Study) -> list[str]:
         ("failure", 0.0, "X", style.VERMILLION),
     ):
         eta = found.loc[found["outcome"] == outcome, "eta"]
-        axis.plot(eta, np.full(len(eta), height), marker, color=colour, label=f"simulated: {outcome}")
+        axis.plot(
+            eta, np.full(len(eta), height), marker, color=colour, label=f"simulated: {outcome}"
+        )
     axis.set_xlabel("site η")
     axis.set_ylabel("probability of success")
     axis.yaxis.set_major_formatter(style.percent())

@@ -143,7 +143,14 @@ def first_node(study: Study) -> list[str]:
             points = found[(found["case"] == case) & (found["predictors"] == name)]
             points = points.set_index("kind")[["u_z_mm", "u_y_mm"]]
             colour = (style.GREEN, style.VERMILLION)[column]
-            axis.plot(*points.loc["sample"].to_numpy().T, "o", ms=2.5, color=colour, alpha=0.5, label="samples")
+            axis.plot(
+                *points.loc["sample"].to_numpy().T,
+                "o",
+                ms=2.5,
+                color=colour,
+                alpha=0.5,
+                label="samples",
+            )
             axis.plot(*points.loc["predicted"], "D", color=colour, mec="black", label="predicted")
             axis.plot(*points.loc["simulated"], "*", ms=10, color="black", label="simulated")
             style.titled(axis, f"case {case}, {_LABELS[name]}")

@@ -33,7 +33,10 @@ def workflow(study: Study) -> list[str]:
     axis.grid(False)
     axis.set_xlim(-0.1, 10.0)
     axis.set_ylim(-0.1, 3.7)
-    for title, height, colour in (("offline, once", 3.35, "#dbe9f6"), ("online, milliseconds", 1.15, "#fde6d5")):
+    for title, height, colour in (
+        ("offline, once", 3.35, "#dbe9f6"),
+        ("online, milliseconds", 1.15, "#fde6d5"),
+    ):
         axis.text(0.0, height, title, fontsize=9, fontweight="bold")
         for x, y, text in _BOXES.values():
             if (y > 1.0) == (height > 2.0):
