@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from braidcast import Case, InputError
 from braidcast.case_toml import toml_text
 from braidcast.dataset.plan import Plan, Range
-from braidcast.study import PLAN
+from braidcast.study import PLAN as PLAN_OF_THE_STUDY
 
 HOME = Path(__file__).parents[2]
 
@@ -43,7 +43,7 @@ def complaint(text: str) -> str:
 
 
 def test_the_example_is_the_study() -> None:
-    plan = Plan.from_toml(PLAN)
+    plan = Plan.from_toml(PLAN_OF_THE_STUDY)
     assert (plan.cases, plan.subsets, plan.tests) == (900, (150, 300, 600), 100)
     assert [(p.column, p.low, p.high) for p in plan.ranges] == [
         ("vessel_P1_y_mm", 10.0, 30.0),

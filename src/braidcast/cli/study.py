@@ -30,8 +30,8 @@ def study(
         typer.Option(
             "--dataset",
             metavar="DATASET",
-            help="Folder of the simulations, for example that of `make study`; a dataset of your "
-            "own with tests and subsets has the same report. Default: DIR/dataset, made if missing.",
+            help="Folder of the simulations, for example that of `make study`, or of your own with "
+            "tests and subsets. Default: DIR/dataset, made if missing.",
         ),
     ] = None,
     workers: Annotated[

@@ -98,7 +98,7 @@ def _image(scene: Scene, vessel: pyvista.PolyData) -> NDArray[np.uint8]:
             return np.asarray(plotter.screenshot(return_img=True))
         lines = [*scene.lines, f"wires drawn {MAGNIFICATION:g} times as thick as they are"]
         lower = LINE * (len(lines) - 2)  # where there are more lines than usual
-        for text, height, size in (
+        for text, height, font_size in (
             (scene.title, 0.945, 16),
             ("\n".join(lines), 0.875 - lower, 12),
         ):
@@ -106,7 +106,7 @@ def _image(scene: Scene, vessel: pyvista.PolyData) -> NDArray[np.uint8]:
                 text,
                 position=(0.015, height),
                 viewport=True,
-                font_size=size,
+                font_size=font_size,
                 color="black",
                 shadow=False,
             )

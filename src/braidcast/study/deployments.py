@@ -52,7 +52,7 @@ def strategy(study: Study, samples: int) -> list[str]:
 
 
 def sites(study: Study, samples: int) -> list[str]:
-    """sites.csv, site_probability.csv, data/sites.npz: the example vessel at sites from end to end."""
+    """sites.csv, site_probability.csv, data/sites.npz: the example vessel, η from 0 to 1."""
     first = example(study.simulations(samples).cases[0])
     model = load_model(study.home / MODEL)
     rows, shapes = [], []

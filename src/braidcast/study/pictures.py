@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.image import imread
 from numpy.typing import NDArray
 
 from braidcast.atomic import write_atomically
@@ -150,7 +150,7 @@ def _fill(axes: Sequence[Axes], scenes: Sequence[Scene], titles: Sequence[str]) 
     with Drawer() as drawer:
         drawn = drawer.draw(list(scenes), NOTHING)
     for letter, axis, png, title in zip("ABCDEFGHIJ", axes, drawn, titles, strict=False):
-        axis.imshow(matplotlib.image.imread(BytesIO(png)), interpolation="antialiased")
+        axis.imshow(imread(BytesIO(png)), interpolation="antialiased")
         axis.set_title(rf"$\bf{{{letter}}}$  {title}", loc="left", fontsize=8.5)
 
 

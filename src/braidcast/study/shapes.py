@@ -195,7 +195,7 @@ def first_node(study: Study, size: Size) -> list[str]:
         for case, asked, real in zip(
             examples, predictors(simulations, tests, name), true, strict=True
         ):
-            predicted = model.predict(asked[None])[0, :3]
+            predicted = np.asarray(model.predict(asked[None]))[0, :3]
             samples = model.sample(asked, 100, np.random.default_rng(0))[:, :3]
             points = np.vstack([real[:3], predicted, samples])
             kind = ["simulated", "predicted", *["sample"] * len(samples)]

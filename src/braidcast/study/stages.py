@@ -2,14 +2,15 @@
 
 A stage is a function of a ``Study`` that writes files below the study's folder and returns their
 names. When it is done, a stamp in ``stages/`` keeps a key of all that went in (its options, the
-cases it reads, the files of the stages it needs, the sources) and a checksum of every file that came
-out. A stage whose stamp has the same key, and whose files are what they were, is not done again.
+cases it reads, the files of the stages it needs, the sources) and a checksum of every file that
+came out. A stage whose stamp has the same key, and whose files are what they were, is not done
+again.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
-import inspect
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -135,20 +136,38 @@ def _key(stage: Stage, data: str, needed: Sequence[Done]) -> str:
         _sources(),
         {name: version(name) for name in _LIBRARIES},
     ]
-    source = inspect.getsourcefile(stage.work)
-    assert source is not None
-    text = json.dumps(parts, sort_keys=True, default=str) + _checksum(Path(source))
+    text = json.dumps(parts, sort_keys=True, default=str) + _own_sources(stage.work.__module__)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 @cache
 def _sources() -> str:
-    """Of braidcast itself, less the stages, whose own sources are in their keys, and commands."""
+    """Of braidcast itself, less commands and stages, whose own sources are in their keys."""
     package = Path(braidcast.__file__).parent
     digest = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
         if path.relative_to(package).parts[0] not in ("cli", "study"):
             digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+@cache
+def _own_sources(module: str) -> str:
+    """Of a module of the study and all of the study that it imports, and those import."""
+    digest, waiting, seen = hashlib.sha256(), [module], set[str]()
+    while waiting:
+        name = waiting.pop()
+        below = name.removeprefix(f"{__package__}.").split(".")
+        path = Path(__file__).parent.joinpath(*below).with_suffix(".py")
+        if name in seen or not name.startswith(f"{__package__}.") or not path.is_file():
+            continue
+        seen.add(name)
+        source = path.read_bytes()
+        digest.update(source)
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                # What is imported from a package may be a module of it, or a name.
+                waiting += [node.module, *(f"{node.module}.{a.name}" for a in node.names)]
     return digest.hexdigest()
 
 

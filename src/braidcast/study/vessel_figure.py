@@ -72,12 +72,16 @@ def _parameters(axis: Axes, case: Case, distance: Array, z: Array, y: Array) -> 
         side = np.array([0.0, 0.0, sac.radius])
         _measure(axis, sac.centre - side, sac.centre + side, "$D_a$")
         axis.plot(sac.centre[2], sac.centre[1], "o", color="black", ms=3)
-        axis.annotate("$C_a$", sac.centre[[2, 1]], (4, -11), textcoords="offset points")
+        axis.annotate("$C_a$", _zy(sac.centre), (4, -11), textcoords="offset points")
 
 
 def _measure(axis: Axes, start: Array, end: Array, name: str) -> None:
     """An arrow with two heads from place to place, with a name."""
     arrow = {"arrowstyle": "<->", "shrinkA": 0, "shrinkB": 0, "lw": 0.9}
-    axis.annotate("", start[[2, 1]], end[[2, 1]], arrowprops=arrow)
+    axis.annotate("", _zy(start), _zy(end), arrowprops=arrow)
     middle = 0.5 * (start + end) + 0.25 * (end - start)
-    axis.annotate(name, middle[[2, 1]], (3, 3), textcoords="offset points")
+    axis.annotate(name, _zy(middle), (3, 3), textcoords="offset points")
+
+
+def _zy(point: Array) -> tuple[float, float]:
+    return float(point[2]), float(point[1])

@@ -15,8 +15,8 @@ _INTENDED = """\
   against simulations, never against patients."""
 
 _LIMITS = """\
-- It knows what the simulation knows: rigid smooth walls, a round vessel of constant diameter bent in
-  one plane, one spherical sac, Coulomb friction, a delivery all at once. No flow, no clotting.
+- It knows what the simulation knows: rigid smooth walls, a round vessel of constant diameter bent
+  in one plane, one spherical sac, Coulomb friction, a delivery all at once. No flow, no clotting.
 - Another device is refused. Numbers outside the ranges above are answered with `in_range` false: a
   hint, not a prediction.
 - The shape of a predicted failure is that of a successful deployment; shapes are learned from
@@ -41,8 +41,8 @@ def model_card(model: SurrogateModel) -> str:
     lines = [
         f"# Model card: {record['name']}",
         "",
-        f"A reduced order model (recipe `{model.recipe.name}`, {model.rom.modes} modes, one Gaussian "
-        "process each) of the deployed braid, and a classifier of the outcome.",
+        f"A reduced order model (recipe `{model.recipe.name}`, {model.rom.modes} modes, one "
+        "Gaussian process each) of the deployed braid, and a classifier of the outcome.",
         "",
         "## Data",
         "",

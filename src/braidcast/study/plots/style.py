@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from io import BytesIO
+from typing import Any
 
 import matplotlib
 from matplotlib import ticker
@@ -24,7 +25,7 @@ OURS, PAPER, PUBLISHED = BLUE, VERMILLION, BLACK
 WIDTH = 7.2
 """Of a diagram, inches."""
 
-_SETTINGS = {
+_SETTINGS: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
