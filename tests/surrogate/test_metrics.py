@@ -73,12 +73,25 @@ def test_undefined_values_are_nan():
 
 
 def test_intervals_of_proportions_are_binomial():
-    """The bootstrap of a share of n cases is the binomial distribution."""
-    success, probability = table(TP=200, FN=40, FP=20, TN=140)
-    low, high = intervals(success, probability, count=4000)["accuracy"]
+    """Of large numbers the normal one; with no error in n, (α/2)^(1/n) and more."""
+    found = intervals(*table(TP=200, FN=40, FP=20, TN=140))
     std = np.sqrt(0.85 * 0.15 / 400)
-    assert low == pytest.approx(0.85 - 1.96 * std, abs=0.2 * std)
-    assert high == pytest.approx(0.85 + 1.96 * std, abs=0.2 * std)
+    assert found["accuracy"] == pytest.approx(
+        (0.85 - 1.96 * std, 0.85 + 1.96 * std), abs=0.25 * std
+    )
+    without = intervals(*table(TP=67, FN=0, FP=0, TN=33))
+    for name, n in (("accuracy", 100), ("sensitivity", 67), ("specificity", 33), ("precision", 67)):
+        assert without[name] == pytest.approx((0.025 ** (1 / n), 1.0))
+
+
+def test_intervals_of_other_values_are_bootstraps():
+    """The Brier score of large numbers, against the normal one of a mean."""
+    success, probability = table(TP=200, FN=40, FP=20, TN=140)
+    squares = (np.asarray(probability) - np.asarray(success)) ** 2
+    std = squares.std() / 20.0
+    low, high = intervals(success, probability, count=4000)["Brier"]
+    mean = squares.mean()
+    assert (low, high) == pytest.approx((mean - 1.96 * std, mean + 1.96 * std), abs=0.2 * std)
 
 
 def test_intervals_hold_the_values_and_repeat(sample):

@@ -15,7 +15,7 @@ from braidcast.cli.messages import told
 from braidcast.cli.predict import predict
 from braidcast.cli.simulate import simulate
 from braidcast.cli.study import study
-from braidcast.cli.train import evaluate, train
+from braidcast.cli.train import card, evaluate, train
 
 app = typer.Typer(
     name="braidcast",
@@ -55,5 +55,6 @@ app.command(epilog="Example:  braidcast simulate examples/success.toml -o demo")
 app.command(epilog="Example:  braidcast predict examples/success.toml -o predicted")(predict)
 app.command(epilog="Example:  braidcast train sixty -o sixty.npz")(train)
 app.command(epilog="Example:  braidcast evaluate sixty.npz sixty -o tested")(evaluate)
+app.command(epilog="Example:  braidcast card > model_card.md")(card)
 app.command(epilog="Example:  braidcast study --samples 150 -o report")(study)
 app.add_typer(dataset.app, name="dataset")

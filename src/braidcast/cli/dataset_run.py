@@ -38,6 +38,10 @@ def run(
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Do the cases again that failed before.")
     ] = False,
+    cases: Annotated[
+        int | None,
+        typer.Option("--cases", metavar="N", min=1, help="Do the first N only. Default: all."),
+    ] = None,
 ) -> None:
     """Simulate every case of a dataset that has no result yet.
 
@@ -63,6 +67,7 @@ def run(
                     workers=workers,
                     scheduler=scheduler,
                     retry_failed=retry_failed,
+                    cases=cases,
                     progress=display,
                     say=display.say,
                 )

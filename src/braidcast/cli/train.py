@@ -1,4 +1,4 @@
-"""braidcast train and evaluate."""
+"""braidcast train, evaluate and card."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def train(
         rows = [
             ("model", f"{model.record['name']}"),
             ("modes", f"{tuning['modes']}"),
-            ("file", f"{output}, {output.stat().st_size / 1e6:.1f} MB"),
+            ("file", f"{output}, {output.stat().st_size / 1e6:.2g} MB"),
         ]
         tested = [] if evaluation is None else test_rows(evaluation)
         typer.echo(table([*rows, *tested]))
@@ -111,6 +111,23 @@ def evaluate(
                 write_atomically(into / name, text.encode())
             rows.append(("in", str(into)))
         typer.echo(table(rows))
+
+
+def card(
+    model: Annotated[
+        Path | None,
+        typer.Argument(metavar="[MODEL]", help="A model file. Default: braidcast's own."),
+    ] = None,
+) -> None:
+    """Print what to know of a surrogate before trusting it: data, ranges, errors, use, limits.
+
+    Exit codes: 0 done; 2 bad input.
+    """
+    with told():
+        from braidcast.surrogate.model_card import model_card
+        from braidcast.surrogate.model_file import load_model
+
+        typer.echo(model_card(load_model(model)), nl=False)
 
 
 def test_rows(found: Evaluation) -> list[tuple[str, str]]:

@@ -69,53 +69,59 @@ def _image(scene: Scene, vessel: pyvista.PolyData) -> NDArray[np.uint8]:
                 split_sharp_edges=True,
                 specular=0.2,
             )
-        wires = polydata(scene.positions, scene.wires, {"value": scene.values})
-        plotter.add_mesh(
-            wires.tube(radius=MAGNIFICATION * scene.wire_radius, n_sides=8),
-            scalars="value",
-            clim=scene.limits,
-            cmap="viridis",
-            smooth_shading=True,
-            show_scalar_bar=not scene.bare,
-            scalar_bar_args={
-                "title": f"{scene.legend}\n",
-                "color": "black",
-                "fmt": f"%.{decimals(scene.limits)}f",
-                "n_labels": LABELS,
-                "width": 0.4,
-                "height": 0.1,
-                "position_x": 0.3,
-                "position_y": 0.02,
-                "title_font_size": 24,
-                "label_font_size": 22,
-            },
-        )
-        if scene.bare:
-            _add_marks(plotter, scene)
-            view = _view(scene, *BARE_BAND, size)
-            _aim(plotter, view)
-            _add_ruler(plotter, view, size, 20)
-            return np.asarray(plotter.screenshot(return_img=True))
-        lines = [*scene.lines, f"wires drawn {MAGNIFICATION:g} times as thick as they are"]
-        lower = LINE * (len(lines) - 2)  # where there are more lines than usual
-        for text, height, font_size in (
-            (scene.title, 0.945, 16),
-            ("\n".join(lines), 0.875 - lower, 12),
-        ):
-            plotter.add_text(
-                text,
-                position=(0.015, height),
-                viewport=True,
-                font_size=font_size,
-                color="black",
-                shadow=False,
-            )
-        view = _view(scene, BELOW, ABOVE - lower, size)
+        if len(scene.wires):
+            _add_wires(plotter, scene)
+        _add_marks(plotter, scene)
+        band = BARE_BAND if scene.bare else (BELOW, ABOVE - _add_caption(plotter, scene))
+        view = _view(scene, *band, size)
         _aim(plotter, view)
-        _add_ruler(plotter, view, size, 12)
+        _add_ruler(plotter, view, size, 20 if scene.bare else 12)
         return np.asarray(plotter.screenshot(return_img=True))
     finally:
         plotter.close()
+
+
+def _add_wires(plotter: pyvista.Plotter, scene: Scene) -> None:
+    wires = polydata(scene.positions, scene.wires, {"value": scene.values})
+    plotter.add_mesh(
+        wires.tube(radius=MAGNIFICATION * scene.wire_radius, n_sides=8),
+        scalars="value",
+        clim=scene.limits,
+        cmap="viridis",
+        smooth_shading=True,
+        show_scalar_bar=not scene.bare,
+        scalar_bar_args={
+            "title": f"{scene.legend}\n",
+            "color": "black",
+            "fmt": f"%.{decimals(scene.limits)}f",
+            "n_labels": LABELS,
+            "width": 0.4,
+            "height": 0.1,
+            "position_x": 0.3,
+            "position_y": 0.02,
+            "title_font_size": 24,
+            "label_font_size": 22,
+        },
+    )
+
+
+def _add_caption(plotter: pyvista.Plotter, scene: Scene) -> float:
+    """Title and lines; the share of the height that they need more than usual."""
+    lines = [*scene.lines, f"wires drawn {MAGNIFICATION:g} times as thick as they are"]
+    lower = LINE * (len(lines) - 2)
+    for text, height, font_size in (
+        (scene.title, 0.945, 16),
+        ("\n".join(lines), 0.875 - lower, 12),
+    ):
+        plotter.add_text(
+            text,
+            position=(0.015, height),
+            viewport=True,
+            font_size=font_size,
+            color="black",
+            shadow=False,
+        )
+    return lower
 
 
 def decimals(limits: tuple[float, float]) -> int:

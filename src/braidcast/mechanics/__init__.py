@@ -1,4 +1,4 @@
-"""Nets of geometrically nonlinear beams: joints, supports, loads, walls, equilibrium.
+"""Nets of geometrically nonlinear beams: joints, supports, loads, walls, equilibrium::
 
 net = BeamNet(nodes, elements, Section.circular(radius, young_modulus, poisson_ratio))
 problem = Problem(net, supports=Supports.clamp(len(nodes), [0]), loads=loads)

@@ -51,7 +51,10 @@ class Prediction:
     _sampler: Callable[[int, np.random.Generator], Array] = field(repr=False)
 
     def sample(self, n: int, rng: np.random.Generator | int | None = None) -> Array:
-        """Draw ``n`` shapes from the predicted distribution, (n, N, 3) mm; ``rng`` or its seed."""
+        """Draw ``n`` shapes from the predicted distribution, (n, N, 3) mm; ``rng`` or its seed.
+
+        They differ in what the modes hold; ``std`` counts what they leave out as well.
+        """
         return self._sampler(n, np.random.default_rng(rng))
 
     @property
