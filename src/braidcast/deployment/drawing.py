@@ -186,7 +186,7 @@ def _add_marks(plotter: pyvista.Plotter, scene: Scene) -> None:
 
     if scene.marked is not None and len(scene.marked):
         balls = pyvista.PolyData(scene.positions[scene.marked]).glyph(
-            geom=pyvista.Sphere(radius=5.0 * scene.wire_radius), scale=False, orient=False
+            geom=pyvista.Sphere(radius=10.0 * scene.wire_radius), scale=False, orient=False
         )
         plotter.add_mesh(balls, color=MARK)
     for curve in scene.curves:
@@ -203,7 +203,8 @@ def _add_ruler(
 
     half = view.half_height * np.array([size[0] / size[1], 1.0])
     length = max(n for n in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if n <= max(0.1, half[0] / 2))
-    left, low = -0.97 * half[0], -0.88 * half[1]
+    # Just above the number.
+    left, low = -0.97 * half[0], (4.4 * font_size / size[1] - 0.94) * half[1]
     # Nearer to the eye than anything else, so that nothing hides it.
     plane = view.centre + 100.0 * view.eye + low * view.up
     ends = plane + left * view.right, plane + (left + length) * view.right

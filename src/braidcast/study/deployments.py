@@ -4,8 +4,9 @@ import numpy as np
 import pandas as pd
 
 from braidcast.case import Case
-from braidcast.deployment.position import RingPath
+from braidcast.deployment.position import RingPath, placed
 from braidcast.deployment.simulate import simulate
+from braidcast.mechanics import State
 from braidcast.study.surrogates import MODEL
 from braidcast.study.workspace import Study
 from braidcast.surrogate.model_file import load_model
@@ -32,18 +33,20 @@ def example(simulations_case: Case) -> Case:
 
 
 def strategy(study: Study, samples: int) -> list[str]:
-    """data/strategy.npz: free, crimped, positioned and deployed nodes, and centrelines C_t."""
+    """data/strategy.npz: nodes free, crimped, straight on C_0, positioned, deployed; and C_t."""
     case = example(study.simulations(samples).cases[0])
     deployment = simulate(case, keep_frames=True, cache=study.home / "data")
     frames = dict(deployment.frames)
     path = RingPath.along(deployment.positioned_centreline)
+    crimped = State(frames["crimp"], np.tile(np.eye(3), (len(frames["crimp"]), 1, 1)))
     fractions = np.linspace(0.0, 1.0, CENTRELINES)
     return [
         study.write_arrays(
             "strategy",
             case=case.to_toml(),
             free=frames["free"],
-            crimped=frames["crimp"],
+            crimped=crimped.positions,
+            straight=placed(crimped, case.braid.rings, path, 0.0).positions,
             positioned=frames["position"],
             deployed=deployment.positions,
             centrelines=np.array([path.rings(fraction)[0] for fraction in fractions]),

@@ -16,6 +16,9 @@ SHOWN_SITES = (0.1, 0.5)
 
 FALSE_NEGATIVES = 4
 
+ERRORS = (1e-3, 0.3)
+"""Scale of the colours of nodal errors, mm, one for both recipes."""
+
 
 def stages(sizes: Sequence[Size], middle: Size, samples: int) -> list[Stage]:
     """One stage a figure; ``middle`` is the size at which the paper compares."""
@@ -50,7 +53,7 @@ def stages(sizes: Sequence[Size], middle: Size, samples: int) -> list[Stage]:
 def strategy(study: Study) -> list[str]:
     """The deployment strategy, from the free stent to the deployed (paper, Figure 2)."""
     data = study.arrays("strategy")
-    states = {name: data[name] for name in ("free", "crimped", "positioned", "deployed")}
+    states = {name: data[name] for name in pictures.STATES}
     name = "figures/strategy.png"
     path = study.place(name)
     pictures.strategy_figure(path, case_of(data["case"]), **states, centrelines=data["centrelines"])
@@ -69,7 +72,7 @@ def sites(study: Study) -> list[str]:
         title = f"η = {table['eta'][row]:.1f}: {table['outcome'][row]}"
         panels.append(pictures.Panel(case, positions, title, mark=inside))
     name = "figures/sites.png"
-    pictures.braids_figure(study.place(name), panels, columns=2)
+    pictures.braids_figure(study.place(name), panels)
     return [name]
 
 
@@ -86,7 +89,7 @@ def false_negatives(study: Study, samples: int) -> list[str]:
         title += f", end {row['gap_mm']:.2f} mm from the sac"
         panels.append(pictures.Panel(simulations.cases[index], simulations.positions[index], title))
     name = "figures/false_negatives.png"
-    pictures.braids_figure(study.place(name), panels, columns=2)
+    pictures.braids_figure(study.place(name), panels)
     return [name]
 
 
@@ -96,18 +99,17 @@ def examples(study: Study, samples: int) -> list[str]:
     simulations = study.simulations(samples)
     written = []
     for recipe in ("paper", "ours"):
-        error = data[f"{recipe}_error"]
+        error = np.log10(np.maximum(data[f"{recipe}_error"], ERRORS[0]))
         panels = []
         for k, number in enumerate(data["case"]):
             row = table.loc[(recipe, number)]
-            title = f"case {number}: D_v {row['D_v_mm']:.2f}, D_a {row['D_a_mm']:.2f} mm"
+            title = f"case {number}: $D_v$ {row['D_v_mm']:.2f}, $D_a$ {row['D_a_mm']:.2f} mm"
             title += f"\nAE {row['AE']:.4f}, ME {row['ME']:.4f} mm"
             case = simulations.cases[int(np.searchsorted(simulations.numbers, number))]
             positions = data[f"{recipe}_positions"][k]
             panels.append(pictures.Panel(case, positions, title, values=error[k]))
-        limits = 0.0, float(f"{np.quantile(error, 0.999):.1g}")
         name = f"figures/examples_{recipe}.png"
         legend = "distance from the simulated node (mm)"
-        pictures.braids_figure(study.place(name), panels, legend=legend, limits=limits, columns=2)
+        pictures.braids_figure(study.place(name), panels, legend=legend, decades=ERRORS)
         written.append(name)
     return written

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from numpy.typing import NDArray
@@ -29,6 +29,10 @@ DOTS = 170
 """Dots an inch."""
 
 _WIDTH, _ASPECT = 7.2, 0.625
+
+
+STATES = ("free", "crimped", "straight", "positioned", "deployed")
+"""Nodes that ``strategy_figure`` needs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +54,14 @@ def braids_figure(
     panels: Sequence[Panel],
     *,
     legend: str = "",
-    limits: tuple[float, float] = (0.0, 1.0),
-    columns: int = 2,
+    decades: tuple[float, float] = (1.0, 10.0),
 ) -> None:
     """Write a PNG of braids, each seen with its sac upwards and with a ruler of its own.
 
-    ``legend`` and ``limits`` of the colours, if there are values. ``PictureError`` if this machine
-    cannot draw.
+    Values are decimal logarithms; ``legend`` and the ends ``decades`` of their scale, if there are
+    any. ``PictureError`` if this machine cannot draw.
     """
+    limits = float(np.log10(decades[0])), float(np.log10(decades[1]))
     scenes = [
         replace(
             _scene(p.case, p.positions, p.values, limits),
@@ -66,12 +70,13 @@ def braids_figure(
         )
         for p in panels
     ]
-    figure, axes = _panels(len(scenes), columns)
-    _fill(axes, scenes, [p.title for p in panels])
+    titles = [p.title for p in panels]
+    figure, axes = _figure(titles, 0.55 if legend else 0.0)
+    _fill(axes, scenes, titles)
     if legend:
-        colours = ScalarMappable(Normalize(*limits), "viridis")
+        colours = ScalarMappable(LogNorm(*decades), "viridis")
         bar = figure.colorbar(
-            colours, ax=axes, location="bottom", shrink=0.6, aspect=40, extend="max", pad=0.02
+            colours, ax=axes, location="bottom", shrink=0.6, aspect=40, extend="both", pad=0.02
         )
         bar.set_label(legend)
     _save(figure, path)
@@ -83,48 +88,44 @@ def strategy_figure(
     *,
     free: Array,
     crimped: Array,
+    straight: Array,
     positioned: Array,
     deployed: Array,
     centrelines: Array,
 ) -> None:
     """Write a PNG of the deployment strategy (paper, Figure 2).
 
-    Nodes (N, 3) mm in four states; ``centrelines`` (k, rings, 3) from C_0 to C_T. ``PictureError``
+    Nodes (N, 3) mm in five states; ``centrelines`` (k, rings, 3) from C_0 to C_T. ``PictureError``
     if this machine cannot draw.
     """
     surface = vessel_surface(case.vessel_geometry)
-    straight = crimped + centrelines[0, 0] - np.array([0.0, 0.0, crimped[:, 2].min()])
-    beside = free + np.array([0.0, -5.0, 0.0])
-    both = np.concatenate([crimped, beside])
+    both = np.concatenate([crimped, free + np.array([0.0, -5.0, 0.0])])
     whole = _scene(case, positioned, None, (0.0, 1.0))
-    wires = whole.wires
     states = (
-        ("free (below) and crimped stent", both, NOTHING, ()),
-        ("crimped stent on C_0", straight, surface, (centrelines[0],)),
-        ("centreline C_T in the vessel", None, surface, (centrelines[-1],)),
-        ("intermediate centrelines C_t", None, surface, tuple(centrelines)),
-        ("positioned stent", positioned, surface, ()),
-        ("deployed stent", deployed, surface, ()),
+        ("free (below) and crimped stent", both, 2, NOTHING, ()),
+        ("crimped stent on $C_0$ at the site", straight, 1, surface, (centrelines[0],)),
+        ("centreline $C_T$ in the vessel", positioned, 0, surface, (centrelines[-1],)),
+        ("intermediate centrelines $C_t$", straight, 0, surface, tuple(centrelines)),
+        ("positioned stent", positioned, 1, surface, ()),
+        ("deployed stent", deployed, 1, surface, ()),
     )
-    scenes = []
-    for _, positions, vessel, curves in states:
-        shown = positioned if positions is None else positions
-        count = len(shown) // len(positioned)
-        drawn = wires if positions is not None else wires[:0]
-        drawn = np.concatenate([drawn + i * len(positioned) for i in range(count)])
-        scenes.append(
-            replace(
-                whole,
-                positions=shown,
-                wires=drawn,
-                values=np.zeros(len(shown)),
-                surface=vessel,
-                curves=curves,
-                sac=whole.sac if len(vessel[0]) else None,
-            )
+    scenes = [
+        replace(
+            whole,
+            positions=positions,
+            # Without wires the nodes still say what is to be seen.
+            wires=np.concatenate([whole.wires[:0], *(whole.wires + i * count for i in range(n))]),
+            values=np.zeros(len(positions)),
+            surface=vessel,
+            curves=curves,
+            sac=whole.sac if len(vessel[0]) else None,
         )
-    figure, axes = _panels(len(scenes), 2)
-    _fill(axes, scenes, [title for title, *_ in states])
+        for count in [len(positioned)]
+        for _, positions, n, vessel, curves in states
+    ]
+    titles = [title for title, *_ in states]
+    figure, axes = _figure(titles)
+    _fill(axes, scenes, titles)
     _save(figure, path)
 
 
@@ -136,14 +137,16 @@ def _scene(
     return replace(found, bare=True)
 
 
-def _panels(count: int, columns: int) -> tuple[Figure, list[Axes]]:
-    rows = -(-count // columns)
-    width = _WIDTH / columns
-    figure = Figure(figsize=(_WIDTH, rows * (width * _ASPECT + 0.35) + 0.5), layout="constrained")
-    axes = list(figure.subplots(rows, columns, squeeze=False).flat)
+def _figure(titles: Sequence[str], below: float = 0.0) -> tuple[Figure, list[Axes]]:
+    """Two columns of panels as high as their pictures, titles above, ``below`` inches left free."""
+    rows = -(-len(titles) // 2)
+    lines = max(title.count("\n") + 1 for title in titles)
+    height = 0.5 * _WIDTH * _ASPECT + 0.1 + 0.16 * lines
+    figure = Figure(figsize=(_WIDTH, rows * height + below), layout="constrained")
+    axes = list(figure.subplots(rows, 2, squeeze=False).flat)
     for axis in axes:
         axis.set_axis_off()
-    return figure, axes[:count]
+    return figure, axes[: len(titles)]
 
 
 def _fill(axes: Sequence[Axes], scenes: Sequence[Scene], titles: Sequence[str]) -> None:
@@ -155,11 +158,6 @@ def _fill(axes: Sequence[Axes], scenes: Sequence[Scene], titles: Sequence[str]) 
 
 
 def _save(figure: Figure, path: Path) -> None:
-    from PIL import Image
-
     stream = BytesIO()
-    figure.savefig(stream, format="png", dpi=DOTS)
-    image = Image.open(stream).convert("RGB").quantize(256, Image.Quantize.MEDIANCUT)
-    smaller = BytesIO()
-    image.save(smaller, format="PNG", optimize=True)
-    write_atomically(path, smaller.getvalue())
+    figure.savefig(stream, format="png", dpi=DOTS, metadata={"Software": None})
+    write_atomically(path, stream.getvalue())
