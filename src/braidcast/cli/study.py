@@ -53,7 +53,11 @@ def study(
         from braidcast.errors import InputError
         from braidcast.results_folder import check_folder
 
-        missing = [name for name in ("jinja2", "matplotlib", "pyvista") if find_spec(name) is None]
+        missing = [
+            name
+            for name in ("jinja2", "markdown_it", "matplotlib", "pyvista")
+            if find_spec(name) is None
+        ]
         if missing:
             raise InputError(
                 f"{' and '.join(missing)} must be installed for the report: "

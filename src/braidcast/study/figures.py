@@ -77,7 +77,7 @@ def sites(study: Study) -> list[str]:
 
 
 def false_negatives(study: Study, samples: int) -> list[str]:
-    """Up to four successes that are called failures (paper, Figure 11)."""
+    """Up to four successes that are called failures (paper, Figure 10)."""
     table = study.table("false_negatives").head(FALSE_NEGATIVES)
     if table.empty:
         return []
@@ -94,7 +94,7 @@ def false_negatives(study: Study, samples: int) -> list[str]:
 
 
 def examples(study: Study, samples: int) -> list[str]:
-    """Six tests with the nodal error as colour, both recipes (paper, Figure 12)."""
+    """Six tests with the nodal error as colour, both recipes (paper, Figure 11)."""
     data, table = study.arrays("examples"), study.table("examples").set_index(["recipe", "case"])
     simulations = study.simulations(samples)
     written = []

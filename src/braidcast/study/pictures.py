@@ -1,4 +1,4 @@
-"""Pictures of braids in their vessels, several in a figure (paper, Figures 2, 4, 11, 12)."""
+"""Pictures of braids in their vessels, several in a figure (paper, Figures 2, 4, 10, 11)."""
 
 from __future__ import annotations
 

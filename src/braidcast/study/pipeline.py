@@ -5,6 +5,7 @@ from pathlib import Path
 
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.study import (
+    agreement,
     deployments,
     figures,
     importance,
@@ -44,6 +45,15 @@ def pipeline(study: Study, samples: int) -> list[Stage]:
         ("sites", deployments.sites, ("shipped model",)),
     ):
         stages.append(Stage(name, stage, {"samples": samples}, needs, samples))
+    compared = (
+        "table 1",
+        "table 2",
+        "table 3",
+        "table 4",
+        "errors by modes",
+        "errors by simulations",
+    )
+    stages.append(Stage("agreement", agreement.agreement, needs=compared))
     everything = tuple(stage.name for stage in stages)
     drawn = figures.stages(sizes, middle, samples)
     written = Stage(

@@ -16,6 +16,7 @@ _STEP = 0.1  # mm of the grid
 _MARGIN = 1.5  # mm around the vessel
 
 
+@style.drawn
 def vessel(study: Study) -> list[str]:
     """Vessel of the example case with its parameters, and its distance field, in the y-z plane."""
     case = case_of(study.arrays("strategy")["case"])
@@ -27,11 +28,10 @@ def vessel(study: Study) -> list[str]:
         axis.grid(False)
         axis.contour(z, y, distance, [0.0], colors="black", linewidths=1.8)
     _parameters(axes[0], case, distance, z, y)
+    axes[0].set_ylim(y[0], max(y[-1], case.centreline.P1[1] + _MARGIN))
     levels = np.arange(np.floor(2.0 * distance.min()) / 2.0, 2.01, 0.5)
     reach = max(abs(levels[0]), levels[-1])
-    filled = axes[1].contourf(
-        z, y, distance, levels, cmap="RdBu", vmin=-reach, vmax=reach, extend="max"
-    )
+    filled = axes[1].contourf(z, y, distance, levels, cmap="RdBu", vmin=-reach, vmax=reach)
     axes[1].contour(z, y, distance, levels, colors="#444444", linewidths=0.4, linestyles="solid")
     figure.colorbar(filled, ax=axes[1], label="signed distance (mm)", shrink=0.9)
     axes[1].set_xlabel("z (mm)")
@@ -63,7 +63,7 @@ def _parameters(axis: Axes, case: Case, distance: Array, z: Array, y: Array) -> 
     control = np.array([line.P0, line.P1, line.P2])
     axis.plot(control[:, 2], control[:, 1], "o--", color=style.VERMILLION, lw=0.9)
     for name, point in zip(("$P_0$", "$P_1$", "$P_2$"), control, strict=True):
-        axis.annotate(name, (point[2], point[1]), (6, 4), textcoords="offset points")
+        axis.annotate(name, (point[2], point[1]), (-4, -13), textcoords="offset points")
     where = line.at_arc_length(0.15 * line.length)[0]
     along = line.tangent_at_arc_length(0.15 * line.length)[0]
     across = np.array([0.0, along[2], -along[1]]) * case.vessel_radius
@@ -79,8 +79,8 @@ def _measure(axis: Axes, start: Array, end: Array, name: str) -> None:
     """An arrow with two heads from place to place, with a name."""
     arrow = {"arrowstyle": "<->", "shrinkA": 0, "shrinkB": 0, "lw": 0.9}
     axis.annotate("", _zy(start), _zy(end), arrowprops=arrow)
-    middle = 0.5 * (start + end) + 0.25 * (end - start)
-    axis.annotate(name, _zy(middle), (3, 3), textcoords="offset points")
+    beyond = _zy(10.0 * (end - start) / np.linalg.norm(end - start))
+    axis.annotate(name, _zy(end), beyond, textcoords="offset points", ha="center", va="center")
 
 
 def _zy(point: Array) -> tuple[float, float]:

@@ -11,15 +11,16 @@ from braidcast.study.plots import style
 from braidcast.study.workspace import Study
 
 _PARAMETERS = {
-    "vessel_P1_y": "y_P1",
-    "vessel_P1_z": "z_P1",
-    "vessel_diameter": "D_v",
-    "aneurysm_diameter": "D_a",
-    "aneurysm_protrusion": "f",
-    "site_eta": "η",
+    "vessel_P1_y": "$y_{P1}$",
+    "vessel_P1_z": "$z_{P1}$",
+    "vessel_diameter": "$D_v$",
+    "aneurysm_diameter": "$D_a$",
+    "aneurysm_protrusion": "$f$",
+    "site_eta": r"$\eta$",
 }
 
 
+@style.drawn
 def learning(study: Study) -> list[str]:
     """Errors and accuracy by training cases, with 95 % bands."""
     table = study.table("learning_curves")
@@ -29,7 +30,7 @@ def learning(study: Study) -> list[str]:
         "ME": (("ours", "ours", style.OURS), ("paper", "paper's recipe", style.PAPER)),
         "accuracy": (
             (OURS, "ours: ends", style.OURS),
-            (EXAMINED, "support vectors, μ_B", style.PAPER),
+            (EXAMINED, r"support vectors, $\mu_B$", style.PAPER),
         ),
     }
     for axis, (measure, lines) in zip(axes, curves.items(), strict=True):
@@ -53,11 +54,12 @@ def learning(study: Study) -> list[str]:
         else:
             axis.set_yscale("log")
             axis.axhline(TARGETS[measure], color="#777777", lw=0.8, ls="--")
-            style.titled(axis, f"{measure}_p (mm)")
+            style.titled(axis, f"${measure}_p$ (mm)")
         axis.legend(fontsize=7)
     return [style.save(study, figure, "learning_curves")]
 
 
+@style.drawn
 def importance(study: Study) -> list[str]:
     """Sobol indices of three answers of the surrogate, and permutation importance of its error."""
     sobol, table = study.table("sobol"), study.table("importance")

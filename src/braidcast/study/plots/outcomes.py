@@ -1,4 +1,4 @@
-"""Diagrams of the classifiers (paper, Figure 6 and section 3.1)."""
+"""Diagrams of the classifiers (paper, Figure 5 and section 3.1)."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from braidcast.study.sizes import Size
 from braidcast.study.workspace import Study
 
 
+@style.drawn
 def confusion(study: Study, size: Size) -> list[str]:
     """Confusion matrices of all classifiers at one size."""
     table = study.table("table2").query("N_s == @size.cases").set_index("model")
@@ -38,6 +39,7 @@ def confusion(study: Study, size: Size) -> list[str]:
     return [style.save(study, figure, "confusion")]
 
 
+@style.drawn
 def roc(study: Study, sizes: Sequence[Size]) -> list[str]:
     """ROC curves of all classifiers, a panel a size."""
     curves, table = study.table("roc"), study.table("table2")
@@ -65,6 +67,7 @@ def roc(study: Study, sizes: Sequence[Size]) -> list[str]:
     return [style.save(study, figure, "roc")]
 
 
+@style.drawn
 def classifiers(study: Study, sizes: Sequence[Size]) -> list[str]:
     """Accuracy and specificity of all classifiers, ours and the paper's."""
     table = study.table("table2")
@@ -98,6 +101,7 @@ def classifiers(study: Study, sizes: Sequence[Size]) -> list[str]:
     return [style.save(study, figure, "classifiers")]
 
 
+@style.drawn
 def sites(study: Study) -> list[str]:
     """Probability of success along the example vessel, and what simulations say."""
     curve, found = study.table("site_probability"), study.table("sites")
@@ -116,5 +120,5 @@ def sites(study: Study) -> list[str]:
     axis.set_ylabel("probability of success")
     axis.yaxis.set_major_formatter(style.percent())
     axis.set_ylim(-0.05, 1.05)
-    axis.legend(loc="center right")
+    axis.legend(loc="center")
     return [style.save(study, figure, "site_probability")]

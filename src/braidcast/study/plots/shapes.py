@@ -1,4 +1,4 @@
-"""Diagrams of the reduced order model (paper, Figures 7 to 10)."""
+"""Diagrams of the reduced order model (paper, Figures 6 to 9)."""
 
 from __future__ import annotations
 
@@ -14,17 +14,23 @@ from braidcast.study.shapes import BEST, MODES, PREDICTORS, RESOLUTIONS, file_of
 from braidcast.study.sizes import Size
 from braidcast.study.workspace import Study
 
-_LABELS = {"Bezier": "μ_B", "Ncl=3": "μ_cl, 3 points", "Ncl=5": "μ_cl, 5", "Ncl=8": "μ_cl, 8"}
+_LABELS = {
+    "Bezier": r"$\mu_B$",
+    "Ncl=3": r"$\mu_{cl}$, 3 points",
+    "Ncl=5": r"$\mu_{cl}$, 5",
+    "Ncl=8": r"$\mu_{cl}$, 8",
+}
 _RECIPES = {"paper": ("paper's recipe", style.PAPER, "s"), "ours": ("ours", style.OURS, "o")}
 
 
+@style.drawn
 def modes(study: Study, sizes: Sequence[Size]) -> list[str]:
     """Singular values, what the first L hold, and errors by L."""
     sigma, errors = study.table("singular_values"), study.table("errors_by_modes")
     figure, axes = style.panels(2, 2, 2.9)
     for size, colour in zip(sizes, style.CYCLE, strict=False):
         found = sigma[sigma["N_train"] == size.shapes]
-        label = f"N_train = {size.shapes}"
+        label = f"{size.shapes} shapes"
         axes[0].semilogy(found["L"], found["sigma_mm"], color=colour, label=label)
         axes[1].plot(found["L"], found["share_of_sum"], color=colour, label=label)
         chosen = errors[errors["N_train"] == size.shapes]
@@ -32,8 +38,8 @@ def modes(study: Study, sizes: Sequence[Size]) -> list[str]:
         axes[2].semilogy(chosen["L"], chosen["AE_rb"], color=colour, ls="--")
         axes[3].semilogy(chosen["L"], chosen["AE_gpr"].clip(lower=1e-5), color=colour, label=label)
     theirs = published.table(3)
-    axes[2].plot(theirs["L"], theirs["AE_p"], "x", color="black", label="paper, AE_p")
-    axes[2].plot(theirs["L"], theirs["AE_rb"], "+", color="black", label="paper, AE_rb")
+    axes[2].plot(theirs["L"], theirs["AE_p"], "x", color="black", label="paper, $AE_p$")
+    axes[2].plot(theirs["L"], theirs["AE_rb"], "+", color="black", label="paper, $AE_{rb}$")
     for axis in axes[:2]:
         axis.set_xlim(0, 60)
     for axis in axes[2:]:
@@ -42,17 +48,18 @@ def modes(study: Study, sizes: Sequence[Size]) -> list[str]:
     axes[1].yaxis.set_major_formatter(style.percent())
     for axis, title, what in (
         (axes[0], "singular values", "σ (mm)"),
-        (axes[1], "share of Σσ in the first L", ""),
-        (axes[2], "AE_p (full), AE_rb (dashed)", "mm"),
-        (axes[3], "AE_gpr = AE_p − AE_rb", "mm"),
+        (axes[1], r"share of $\Sigma\sigma$ in the first $L$", ""),
+        (axes[2], "$AE_p$ (full), $AE_{rb}$ (dashed)", "mm"),
+        (axes[3], "$AE_{gpr} = AE_p - AE_{rb}$", "mm"),
     ):
         style.titled(axis, title)
-        axis.set_xlabel("modes L")
+        axis.set_xlabel("modes $L$")
         axis.set_ylabel(what)
         axis.legend(fontsize=7)
     return [style.save(study, figure, "modes")]
 
 
+@style.drawn
 def predictors(study: Study, size: Size) -> list[str]:
     """AE_p and ME_p of every test by predictors."""
     groups = {}
@@ -63,23 +70,16 @@ def predictors(study: Study, size: Size) -> list[str]:
     return _boxes(study, "predictors", groups, theirs["AE_p"], theirs["ME_p"], "predictors")
 
 
+@style.drawn
 def simulations(study: Study, sizes: Sequence[Size]) -> list[str]:
     """AE_p and ME_p of every test by number of training shapes, with μ_cl, 8 points."""
     found = study.table("errors_by_simulations")
     groups = {str(s.shapes): found[found["N_train"] == s.shapes] for s in sizes}
     # The paper prints numbers at 146 alone, in its Table 4; its text gives ratios to the others.
     printed = published.table(4).set_index("predictors").loc[BEST]
-    AE, ME = printed["AE_p"], printed["ME_p"]
-    ratios = {"47": (1.92, 1.84), "146": (1.0, 1.0), "346": (1 / 1.14, 1 / 1.04)}
-    pairs = [ratios.get(label, (np.nan, np.nan)) for label in groups]
-    return _boxes(
-        study,
-        "simulations",
-        groups,
-        pd.Series([AE * a for a, _ in pairs]),
-        pd.Series([ME * m for _, m in pairs]),
-        "training shapes",
-    )
+    ratios = published.RATIOS_TO_146.set_index("N_train").reindex([s.shapes for s in sizes])
+    AE, ME = (printed[error] * ratios[f"paper_{error}_ratio"] for error in ("AE_p", "ME_p"))
+    return _boxes(study, "simulations", groups, AE, ME, "training shapes")
 
 
 def _boxes(
@@ -109,7 +109,7 @@ def _boxes(
         axis.plot(places, theirs, "x", color="black", ms=7, mew=1.6, label="mean, paper")
         _resolutions(axis)
         axis.set_yscale("log")
-        axis.set_ylabel(f"{column} (mm)")
+        axis.set_ylabel(f"${column[:2]}_p$ (mm)")
         axis.set_xlabel(what)
         axis.tick_params(axis="x", labelsize=7.5)
         axis.legend(loc="upper right")
@@ -132,6 +132,7 @@ def _resolutions(axis: Axes) -> None:
         )
 
 
+@style.drawn
 def first_node(study: Study) -> list[str]:
     """Samples of the first node's displacement, both predictors, two tests."""
     found = study.table("first_node")
@@ -154,8 +155,8 @@ def first_node(study: Study) -> list[str]:
             axis.plot(*points.loc["predicted"], "D", color=colour, mec="black", label="predicted")
             axis.plot(*points.loc["simulated"], "*", ms=10, color="black", label="simulated")
             style.titled(axis, f"case {case}, {_LABELS[name]}")
-            axis.set_xlabel("u_z (mm)")
-            axis.set_ylabel("u_y (mm)")
+            axis.set_xlabel("$u_z$ (mm)")
+            axis.set_ylabel("$u_y$ (mm)")
         _same_span(axes[2 * row : 2 * row + 2])
     axes[0].legend(loc="best", fontsize=7)
     return [style.save(study, figure, "first_node")]
@@ -169,6 +170,7 @@ def _same_span(axes: Sequence[Axes]) -> None:
         axis.set_ylim(spans[:, 2].min(), spans[:, 3].max())
 
 
+@style.drawn
 def recipes(study: Study) -> list[str]:
     """Ours against the paper's recipe by training shapes."""
     table = study.table("recipes")
@@ -196,7 +198,7 @@ def recipes(study: Study) -> list[str]:
         axis.set_xticks(ticks := sorted(table["N_train"].unique()), [str(t) for t in ticks])
         axis.minorticks_off()
         axis.set_xlabel("training shapes")
-        axis.set_ylabel(f"{theirs} (mm)")
+        axis.set_ylabel(f"${theirs}$ (mm)")
         axis.legend(loc="lower left")
     style.titled(axes[0], "mean over the nodes")
     style.titled(axes[1], "largest of the nodes")

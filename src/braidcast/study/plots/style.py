@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
 from io import BytesIO
 from typing import Any
 
@@ -21,6 +23,8 @@ CYCLE = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY, BLACK)
 
 OURS, PAPER, PUBLISHED = BLUE, VERMILLION, BLACK
 """Of our recipe, of the paper's on our simulations, and of what the paper printed."""
+
+Plot = Callable[..., list[str]]
 
 WIDTH = 7.2
 """Of a diagram, inches."""
@@ -44,28 +48,41 @@ _SETTINGS: dict[Any, Any] = {
 }
 
 
+def drawn(plot: Plot) -> Plot:
+    """The function ``plot``, what it draws in our style."""
+
+    @wraps(plot)
+    def inside(*args: Any, **options: Any) -> list[str]:
+        with matplotlib.rc_context(_SETTINGS):
+            return plot(*args, **options)
+
+    return inside
+
+
 def panels(columns: int, rows: int = 1, height: float = 2.9) -> tuple[Figure, list[Axes]]:
     """A figure of panels, ``height`` inches each, and the panels row by row, lettered A, B, ..."""
-    with matplotlib.rc_context(_SETTINGS):
-        figure = Figure(figsize=(WIDTH, height * rows), layout="constrained")
-        axes = list(figure.subplots(rows, columns, squeeze=False).flat)
+    figure = Figure(figsize=(WIDTH, height * rows), layout="constrained")
+    axes = list(figure.subplots(rows, columns, squeeze=False).flat)
     if len(axes) > 1:
         for letter, axis in zip("ABCDEFGHIJKL", axes, strict=False):
-            axis.set_title(letter, fontweight="bold")
+            axis.set_title(bold(letter))
     return figure, axes
+
+
+def bold(text: str) -> str:
+    """A word in bold within a line of text."""
+    return rf"$\bf{{{text}}}$"
 
 
 def titled(axis: Axes, title: str) -> None:
     """A title after the panel's letter."""
-    letter = axis.get_title(loc="left")
-    axis.set_title(f"{letter}  {title}" if letter else title, fontweight="normal")
+    axis.set_title(f"{axis.get_title(loc='left')}  {title}".strip())
 
 
 def save(study: Study, figure: Figure, name: str) -> str:
     """Write ``figures/name.svg``; returns where."""
     stream = BytesIO()
-    with matplotlib.rc_context(_SETTINGS):
-        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+    figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
     return study.write(f"figures/{name}.svg", stream.getvalue())
 
 

@@ -26,6 +26,7 @@ _ARROWS = (
 _SIZE = (2.1, 1.0)
 
 
+@style.drawn
 def workflow(study: Study) -> list[str]:
     """Offline above, online below."""
     figure, (axis,) = style.panels(1, 1, 2.5)
