@@ -92,6 +92,7 @@ def table2(study: Study, sizes: Sequence[Size]) -> list[str]:
             points = pd.DataFrame({"false_positive_rate": false, "true_positive_rate": true})
             curves.append(points.assign(threshold=np.minimum(cut, 1.0), **key))
     theirs = published.table2_read_rightly()
+    theirs.loc[~theirs["consistent"], list(theirs.columns[2:-1])] = np.nan
     theirs = _of_the_paper(theirs, [c for c in theirs.columns[2:] if c != "consistent"])
     as_printed = published.table(2)
     both = pd.DataFrame(rows).merge(theirs, "left", ["N_s", "model"])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markdown_it import MarkdownIt
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from braidcast.dataset.folder import DatasetFolder
 from braidcast.study.outcomes import OURS
@@ -59,7 +59,7 @@ def write(study: Study, sizes: Sequence[Size], middle: Size, samples: int) -> li
     environment = Environment(
         loader=PackageLoader("braidcast.study"), autoescape=True, undefined=StrictUndefined
     )
-    environment.filters |= {"symbols": _symbols, "kinds": _kinds}
+    environment.filters["kinds"] = _kinds
     simulations = study.simulations(samples)
     verdicts = study.table("agreement")["verdict"]
     text = environment.get_template("report.html").render(
@@ -79,23 +79,27 @@ def write(study: Study, sizes: Sequence[Size], middle: Size, samples: int) -> li
         verdicts={"all": len(verdicts), "agrees": int((verdicts == "agrees").sum())},
         shipped=_shipped(study.table("shipped")),
         card=_card((study.home / "model_card.md").read_text(encoding="utf-8")),
-        agreement=lambda section: _findings(study.table("agreement"), section),
+        agreement=lambda section: list(_findings(study.table("agreement"), section)),
         rows=lambda name: view(name, study.table(name)),
         image=lambda name: _data_uri(study, _file(study, name)),
         file=lambda name: _file(study, name),
         number=number,
     )
-    return [study.write("report.html", text.encode())]
+    return [study.write("report.html", _with_subscripts(text).encode())]
 
 
 def _findings(table: pd.DataFrame, section: str | None) -> Iterable[_Finding]:
+    """Of a section, or all; a reason that is that of the finding before is not said again."""
+    said = ""
     for _, row in table.iterrows():
         if section in (None, row["section"]):
             form = ".1%" if "share" in row["finding"] or row["section"] == "outcomes" else ".3g"
             here, paper, tolerance = (
                 format(row[name], form) for name in ("here", "paper", "may_differ_by")
             )
-            why = "" if pd.isna(row["why"]) else row["why"]
+            reason = "" if pd.isna(row["why"]) else row["why"]
+            why = "As above." if reason and reason == said else reason
+            said = reason or said
             yield _Finding(row["finding"], here, paper, tolerance, row["verdict"], why)
 
 
@@ -137,10 +141,13 @@ def _data_uri(study: Study, file: str) -> str:
     return f"data:image/{kind};base64,{content}"
 
 
-def _symbols(text: str) -> Markup:
-    """N_train as N with a subscript, in whatever stands in a table."""
-    pattern = r"(\b[A-ZLyzμε](?:E)?)_([A-Za-z0-9]+)"
-    return Markup(re.sub(pattern, r"\1<sub>\2</sub>", str(escape(text))))
+def _with_subscripts(html: str) -> str:
+    """N_train as N with a subscript, and so on, wherever it stands between tags."""
+    parts = re.split(r"(<[^>]*>)", html)
+    parts[::2] = [
+        re.sub(r"\b([A-Zyzμεσ]E?)_(\w+)", r"\1<sub>\2</sub>", part) for part in parts[::2]
+    ]
+    return "".join(parts)
 
 
 def _kinds(row: list[str], view: View) -> list[tuple[str, str]]:

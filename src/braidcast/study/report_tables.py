@@ -42,8 +42,9 @@ def _with_paper(*columns: tuple[str, str, str]) -> tuple[Column, ...]:
     return tuple(Column(title, name, form, f"paper_{name}") for title, name, form in columns)
 
 
-def _error(title: str, name: str, paper: bool = True) -> Column:
-    return Column(title, name, ".4f", f"paper_{name}" if paper else "", f"{name}_SD")
+def _error(name: str, form: str = ".3f", paper: str = "paper_") -> Column:
+    """A mean and its standard deviation, to the digits of the paper or others."""
+    return Column(f"{name} (mm)", name, form, f"{paper}{name}" if paper else "", f"{name}_SD")
 
 
 _SHARES = _with_paper(
@@ -81,38 +82,35 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("ε_POD", "eps_POD"),
         Column("L of Σσ", "L", "", "paper_L"),
         Column("L of Σσ²", "L_of_squares"),
-        _error("AE_rb (mm)", "AE_rb"),
-        _error("ME_rb (mm)", "ME_rb"),
-        _error("AE_p (mm)", "AE_p"),
-        _error("ME_p (mm)", "ME_p"),
+        *(_error(name) for name in ("AE_rb", "ME_rb", "AE_p", "ME_p")),
     ),
     "centring": (
         Column("mean taken away", "centred"),
         Column("N_train", "N_train"),
-        *(_error(f"{name} (mm)", name, paper=False) for name in ("AE_rb", "ME_rb", "AE_p", "ME_p")),
+        *(_error(name, ".4f", paper="") for name in ("AE_rb", "ME_rb", "AE_p", "ME_p")),
     ),
     "table4": (
         Column("predictors", "predictors"),
         Column("N_train", "N_train"),
-        _error("AE_p (mm)", "AE_p"),
+        _error("AE_p"),
         Column("AE_p > 0.15 mm", "AE_p_above_3DRA", "", "paper_AE_p_above_3DRA"),
-        _error("ME_p (mm)", "ME_p"),
+        _error("ME_p"),
         Column("ME_p > 0.15 mm", "ME_p_above_3DRA", "", "paper_ME_p_above_3DRA"),
         Column("ME_p > 0.4 mm", "ME_p_above_CTA", "", "paper_ME_p_above_CTA"),
     ),
     "simulations": (
         Column("N_train", "N_train"),
-        _error("AE_p (mm)", "AE_p", paper=False),
+        _error("AE_p", ".4f", paper=""),
         Column("AE_p over that at 146", "AE_p_ratio", ".2f", "paper_AE_p_ratio"),
-        _error("ME_p (mm)", "ME_p", paper=False),
+        _error("ME_p", ".4f", paper=""),
         Column("ME_p over that at 146", "ME_p_ratio", ".2f", "paper_ME_p_ratio"),
     ),
     "recipes": (
         Column("recipe", "recipe"),
         Column("N_train", "N_train"),
         Column("L", "L"),
-        _error("AE (mm)", "AE", paper=False),
-        _error("ME (mm)", "ME", paper=False),
+        _error("AE", ".4f", paper=""),
+        _error("ME", ".4f", paper=""),
         Column("largest ME (mm)", "ME_worst", ".4f"),
         Column("ME > 0.15 mm", "ME_above_3DRA"),
         Column("inside 95 % intervals", "inside_95", ".1%"),
@@ -171,6 +169,16 @@ TABLES: dict[str, tuple[Column, ...]] = {
 }
 
 
+_WORDS = {
+    "Bezier": "μ_B",
+    **{f"Ncl={count}": f"μ_cl, {count} points" for count in (3, 5, 8)},
+    "True": "yes",
+    "False": "no",
+    "paper": "paper's",
+}
+"""What is written otherwise in tables for programs."""
+
+
 def view(name: str, table: pd.DataFrame) -> View:
     """A table as the report shows it; – where there is no value."""
     headings, cells = [], []
@@ -191,6 +199,8 @@ def _cell(row: Any, name: str, spread: str, form: str) -> str:
 def _text(value: Any, form: str) -> str:
     if pd.isna(value):
         return "–"
+    if str(value) in _WORDS:
+        return _WORDS[str(value)]
     if not form and isinstance(value, float):
         return f"{value:g}"
     return format(value, form)

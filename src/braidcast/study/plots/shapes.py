@@ -122,11 +122,10 @@ def _resolutions(axis: Axes) -> None:
     for what, value in RESOLUTIONS.items():
         axis.axhline(value, color="#777777", lw=0.8, ls="--")
         axis.annotate(
-            f"{what} {value:g} mm",
-            (0.01, value),
+            f"{what}\n{value:g} mm",
+            (1.01, value),
             xycoords=("axes fraction", "data"),
-            xytext=(0, 2),
-            textcoords="offset points",
+            va="center",
             fontsize=7,
             color="#555555",
         )

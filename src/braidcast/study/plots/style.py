@@ -88,4 +88,4 @@ def save(study: Study, figure: Figure, name: str) -> str:
 
 def percent() -> ticker.Formatter:
     """Shares as percents."""
-    return ticker.PercentFormatter(1.0)
+    return ticker.PercentFormatter(1.0, decimals=0)
