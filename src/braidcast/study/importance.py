@@ -1,13 +1,17 @@
 """Which parameters matter: for the outcome, for the shape, and for the error of the surrogate."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
-from scipy.stats import sobol_indices, uniform
+from numpy.typing import NDArray
+from scipy.stats import qmc, sobol_indices
 from sklearn.ensemble import RandomForestRegressor
 from sklearn.inspection import permutation_importance
 
 from braidcast.case import Case
 from braidcast.dataset.folder import DatasetFolder
+from braidcast.dataset.plan import Range
 from braidcast.errors import InputError
 from braidcast.study.surrogates import MODEL
 from braidcast.study.workspace import Study
@@ -15,11 +19,14 @@ from braidcast.surrogate.model import SurrogateModel
 from braidcast.surrogate.model_file import load_model
 from braidcast.surrogate.train import learned
 
+Array = NDArray[np.float64]
+
 QUANTITIES = ("probability of success", "deployed length", "standard deviation")
 
 SAMPLES = 512
 """N of Saltelli's scheme: N (parameters + 2) predictions."""
 
+_BOOTSTRAPS = 500
 _TREES = 300
 _PERMUTATIONS = 30
 
@@ -27,35 +34,53 @@ _PERMUTATIONS = 30
 def sobol(study: Study, samples: int) -> list[str]:
     """sobol.csv: first order and total indices over the plan's ranges, with 95 % intervals.
 
-    The surrogate answers (Sobol 2001; estimators and intervals of scipy.stats.sobol_indices): the
+    The surrogate answers (Sobol 2001; estimators of scipy.stats.sobol_indices, bootstrapped): the
     probability of success, and of the shape it predicts the deployed length and the mean standard
     deviation of a node. Parameters the plan has together but no vessel can have count as the mean
     of the others.
     """
     model = load_model(study.home / MODEL)
     plan = DatasetFolder.open(study.dataset).plan
-
-    def answers(values: np.ndarray) -> np.ndarray:
-        """(3, n) of parameters (p, n)."""
-        found = np.array([_answer(model, plan.case, row) for row in values.T]).T
-        missing = np.isnan(found[0])
-        found[:, missing] = found[:, ~missing].mean(axis=1, keepdims=True)
-        return found
-
-    ranges = [uniform(r.low, r.high - r.low) for r in plan.ranges]
     rng = np.random.default_rng(0)
-    indices = sobol_indices(func=answers, n=SAMPLES, dists=ranges, rng=rng)
-    spread = indices.bootstrap()
+    design = _saltelli(plan.ranges, rng)
+    found = np.array(
+        [_answer(model, plan.case, row) for row in design.reshape(-1, design.shape[2])]
+    )
+    found[np.isnan(found[:, 0])] = np.nanmean(found, axis=0)
+    answers = np.moveaxis(found.reshape(*design.shape[:2], -1), 2, 0)
+    values = _indices(answers)
+    resampled = [
+        _indices(answers[:, :, rng.integers(SAMPLES, size=SAMPLES)]) for _ in range(_BOOTSTRAPS)
+    ]
+    low, high = np.quantile(resampled, [0.025, 0.975], axis=0)
     rows = []
     for i, quantity in enumerate(QUANTITIES):
         for j, parameter in enumerate(plan.ranges):
             row = {"quantity": quantity, "parameter": parameter.name}
-            for order in ("first_order", "total_order"):
-                interval = getattr(spread, order).confidence_interval
-                row[order] = getattr(indices, order)[i, j]
-                row |= {f"{order}_low": interval.low[i, j], f"{order}_high": interval.high[i, j]}
+            for k, order in enumerate(("first_order", "total_order")):
+                row[order] = values[k, i, j]
+                row |= {f"{order}_low": low[k, i, j], f"{order}_high": high[k, i, j]}
             rows.append(row)
     return [study.write_table("sobol", pd.DataFrame(rows))]
+
+
+def _saltelli(ranges: Sequence[Range], rng: np.random.Generator) -> Array:
+    """Samples (p + 2, SAMPLES, p): A, B, and A with each parameter of B in turn."""
+    low, high = np.array([(r.low, r.high) for r in ranges]).T
+    count = len(low)
+    drawn = qmc.Sobol(2 * count, rng=rng).random(SAMPLES)
+    A, B = (low + (high - low) * part for part in np.split(drawn, 2, axis=1))
+    mixed = [np.where(np.arange(count) == j, B, A) for j in range(count)]
+    return np.stack([A, B, *mixed])
+
+
+def _indices(answers: Array) -> Array:
+    """First and total order (2, q, p) of answers (q, p + 2, SAMPLES) to the samples above."""
+    mixed = answers[:, 2:].swapaxes(0, 1)
+    result = sobol_indices(
+        func={"f_A": answers[:, 0], "f_B": answers[:, 1], "f_AB": mixed}, n=SAMPLES
+    )
+    return np.stack([result.first_order, result.total_order])
 
 
 def _answer(model: SurrogateModel, case_of: object, values: np.ndarray) -> tuple[float, ...]:

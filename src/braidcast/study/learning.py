@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from braidcast.study.outcomes import probabilities, threshold
+from braidcast.study.sizes import FEWEST
 from braidcast.study.workspace import Study
 from braidcast.surrogate.metrics import NodeErrors
 from braidcast.surrogate.recipes import RECIPES
@@ -64,7 +65,7 @@ def learn_shapes(study: Study, samples: int, recipe: str, count: int) -> list[st
 def learn_outcomes(study: Study, samples: int, name: str, count: int) -> list[str]:
     """Whether every test's outcome is predicted rightly, training sets as above.
 
-    Sets with fewer than ten cases of either outcome are left out.
+    Sets with too few cases of either outcome are left out.
     """
     simulations = study.simulations(samples)
     tests = simulations.classification_tests
@@ -83,7 +84,7 @@ def learn_outcomes(study: Study, samples: int, name: str, count: int) -> list[st
 
 def _enough(simulations: Simulations, training: NDArray[np.int64]) -> bool:
     failures = int((~simulations.success[training]).sum())
-    return min(failures, len(training) - failures) >= 10
+    return min(failures, len(training) - failures) >= FEWEST
 
 
 def _slug(name: str) -> str:

@@ -27,7 +27,7 @@ AT = 300
 def pipeline(study: Study, samples: int) -> list[Stage]:
     """All stages of the study of the first ``samples`` cases, each after those it needs."""
     simulations = study.simulations(samples)
-    sizes = dataset.sizes(DatasetFolder.open(study.dataset).plan, simulations)
+    sizes = dataset.sizes(DatasetFolder.open(study.dataset).plan, simulations, samples)
     middle = next((size for size in sizes if size.cases == AT), sizes[-1])
     stages = [
         Stage("cases", dataset.cases_table, {"samples": samples}, cases=samples),

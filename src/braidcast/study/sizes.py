@@ -8,10 +8,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from braidcast.dataset.plan import Plan
+from braidcast.errors import InputError
 from braidcast.study import published
 from braidcast.study.workspace import Study
 from braidcast.surrogate.predictors import end_depths
 from braidcast.surrogate.training_set import Simulations
+
+FEWEST = 10
+"""Successes, and failures, without which no classifier is trained: folds within folds need some."""
 
 
 @dataclass(frozen=True)
@@ -39,20 +43,32 @@ def known_sizes(plan: Plan) -> list[int]:
     return [*plan.subsets, plan.cases]
 
 
-def sizes(plan: Plan, simulations: Simulations) -> list[Size]:
-    """The subsets of a plan that these simulations fill.
+def sizes(plan: Plan, simulations: Simulations, samples: int) -> list[Size]:
+    """The subsets of a plan up to ``samples`` cases, less those that are too small to learn from.
 
     Where the paper has a subset of as many cases, as many successes train; else all there are.
+    ``InputError`` if none is left, or the tests have no failure or fewer than two successes.
     """
     paper = published.table(1).set_index("N_s")["N_train_regr"]
-    numbers = simulations.numbers
+    numbers, success = simulations.numbers, simulations.success
+    tests = success[simulations.classification_tests]
+    if tests.all() or tests.sum() < 2:
+        raise InputError(
+            f"{tests.sum()} of {tests.size} tests succeed, must be at least 2, and not all of them"
+        )
     found = []
-    for count in known_sizes(plan):
-        if count > numbers.max() + 1:
-            break
+    for count in (size for size in known_sizes(plan) if size <= samples):
+        outcomes = Size(count, 0, 0).classification_training(simulations)
+        fewest = min(success[outcomes].sum(), (~success[outcomes]).sum())
         successes = int((numbers[simulations.regression_training] < count).sum())
-        outcomes = int((numbers[simulations.classification_training] < count).sum())
-        found.append(Size(count, outcomes, min(successes, int(paper.get(count, successes)))))
+        if fewest >= FEWEST:
+            shapes = min(successes, int(paper.get(count, successes)))
+            found.append(Size(count, len(outcomes), shapes))
+    if not found:
+        raise InputError(
+            f"{fewest} of the less frequent outcome among {len(outcomes)} cases to train with, "
+            f"must be at least {FEWEST}"
+        )
     return found
 
 

@@ -105,12 +105,10 @@ def run_stages(
     start_ready()
     for future in completed:
         stage, key = running.pop(future.key)
-        try:
-            files, wall, cpu = future.result()
-        except OSError:
-            raise
-        except Exception as error:
-            raise StageFailed(f"stage {stage.name} failed: {error}") from error
+        result = future.result()
+        if isinstance(result, Exception):
+            raise result
+        files, wall, cpu = result
         _stamp(study.home, stage, key, files, wall, cpu)
         finish(Done(stage.name, files, wall, cpu, again=True))
         start_ready()
@@ -118,12 +116,18 @@ def run_stages(
     return [finished[stage.name] for stage in stages]
 
 
-def _work(study: Study, stage: Stage) -> tuple[dict[str, str], float, float]:
-    """In a worker: files with checksums, wall and CPU seconds."""
+def _work(study: Study, stage: Stage) -> tuple[dict[str, str], float, float] | Exception:
+    """In a worker: files with checksums, wall and CPU seconds; or what to raise in their place."""
     wall, cpu = time.perf_counter(), time.process_time()
-    with threadpool_limits(1):  # the same last digit whatever the machine, and no worker in the way
-        names = stage.work(study, **stage.options)
-    files = {name: _checksum(study.home / name) for name in names}
+    try:
+        with threadpool_limits(1):  # the same last digit whatever the machine, no worker in the way
+            names = stage.work(study, **stage.options)
+        files = {name: _checksum(study.home / name) for name in names}
+    except OSError as error:
+        return OSError(error.errno, error.strerror, error.filename)
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        return StageFailed(f"stage {stage.name} failed: {reason}")
     return files, time.perf_counter() - wall, time.process_time() - cpu
 
 
