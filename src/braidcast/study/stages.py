@@ -20,7 +20,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from distributed import Client, as_completed
+from distributed import Client, KilledWorker, as_completed
 from threadpoolctl import threadpool_limits
 
 import braidcast
@@ -105,7 +105,13 @@ def run_stages(
     start_ready()
     for future in completed:
         stage, key = running.pop(future.key)
-        result = future.result()
+        try:
+            result = future.result()
+        except KilledWorker:
+            raise StageFailed(
+                f"stage {stage.name} failed: its worker died, perhaps for want of memory; "
+                "started again with fewer workers the study goes on from here"
+            ) from None
         if isinstance(result, Exception):
             raise result
         files, wall, cpu = result
