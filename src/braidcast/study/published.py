@@ -1,6 +1,5 @@
 """The tables of the paper as they are printed, and what its Table 2 says when read rightly."""
 
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +33,6 @@ RATIOS_TO_146 = pd.DataFrame(
 """Errors over those with 146 training shapes, μ_cl with 8 points (section 3.2)."""
 
 
-@cache
 def table(number: int) -> pd.DataFrame:
     """Table ``number`` of the paper, 1 to 4, numbers as numbers; nothing else is changed."""
     frame = pd.read_csv(_HOME / f"table{number}.csv")
@@ -48,7 +46,6 @@ def table(number: int) -> pd.DataFrame:
     return frame
 
 
-@cache
 def table2_read_rightly() -> pd.DataFrame:
     """Table 2 by the usual definitions, success being the positive class, in percent.
 
