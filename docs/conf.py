@@ -3,6 +3,7 @@
 import numpy as np
 from docutils import nodes
 from docutils.parsers.rst import Directive
+from docutils.statemachine import StringList
 from numpy.typing import ArrayLike, NDArray
 from sphinx.application import Sphinx
 from sphinx.util.typing import stringify_annotation
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 
 import braidcast
 from braidcast.cli import app
+from braidcast.surrogate.model_card import model_card
 
 project = "braidcast"
 author = "The braidcast authors"
@@ -46,6 +48,16 @@ class CommandLine(Directive):
         section += nodes.literal_block(text=shown.output.strip(), language="text")
         self.state.document.note_explicit_target(section)
         return section
+
+
+class ModelCard(Directive):
+    """The card of the model that ships, of the model itself."""
+
+    def run(self) -> list[nodes.Node]:
+        _, *lines = model_card(braidcast.load_model()).splitlines()
+        page = nodes.section()
+        self.state.nested_parse(StringList(lines, "model card"), 0, page, match_titles=True)
+        return list(page.children)
 
 
 def _commands(command: object, path: tuple[str, ...]) -> list[tuple[str, ...]]:
@@ -85,3 +97,4 @@ def setup(app: Sphinx) -> None:
     app.connect("autodoc-process-signature", _signature)
     app.connect("autodoc-process-docstring", _docstring)
     app.add_directive("command-line", CommandLine)
+    app.add_directive("model-card", ModelCard)

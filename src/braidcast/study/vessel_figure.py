@@ -12,7 +12,7 @@ from braidcast.study.workspace import Study, case_of
 
 Array = NDArray[np.float64]
 
-_STEP = 0.1  # mm of the grid
+_STEP = 0.2  # mm of the grid
 _MARGIN = 1.5  # mm around the vessel
 
 
