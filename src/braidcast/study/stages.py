@@ -152,10 +152,10 @@ def _key(stage: Stage, data: str, needed: Sequence[Done]) -> str:
 
 @cache
 def _sources() -> str:
-    """Of braidcast itself, less commands and stages, whose own sources are in their keys."""
+    """Of braidcast and its model, less commands and stages: their own sources are in their keys."""
     package = Path(braidcast.__file__).parent
     digest = hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
+    for path in sorted([*package.rglob("*.py"), *package.rglob("*.npz")]):
         if path.relative_to(package).parts[0] not in ("cli", "study"):
             digest.update(path.read_bytes())
     return digest.hexdigest()
