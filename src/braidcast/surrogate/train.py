@@ -1,7 +1,6 @@
 """Train a surrogate on the simulations of a dataset."""
 
 import platform
-import time
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 
@@ -66,14 +65,11 @@ def train(
     for case in cases:
         applicability.check_device(case)
     data = learned(recipe, simulations, shapes)
-    begin = time.process_time()
     rom = recipe.reduced_order_model(cases, max(recipe.modes))
     tuning = tune(rom, data.predictors, data.snapshots, recipe.modes, progress)
-    tuned = time.process_time()
     rom.set_params(modes=tuning.modes).fit(data.predictors, data.snapshots, progress)
     seen = np.array([recipe.view(simulations.cases[index]).ends for index in outcomes])
     ends = EndsClassifier().fit(seen, simulations.end_in_sac[outcomes])
-    trained = time.process_time()
     return SurrogateModel(
         recipe=recipe,
         rom=rom,
@@ -89,7 +85,6 @@ def train(
             "shapes": len(shapes),
             "outcomes": len(outcomes),
             "cross_validation": asdict(tuning),
-            "cpu_seconds": {"tuning": tuned - begin, "training": trained - tuned},
             "versions": {
                 "braidcast": __version__,
                 "python": platform.python_version(),
