@@ -97,7 +97,7 @@ def classifiers(study: Study, sizes: Sequence[Size]) -> list[str]:
         for k, size in enumerate(sizes)
     ]
     handles += axes[0].plot([], [], "x", color="black", label="paper, read rightly")
-    figure.legend(handles=handles, loc="outside lower center", ncols=5)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return [style.save(study, figure, "classifiers")]
 
 

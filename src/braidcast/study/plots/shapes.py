@@ -34,7 +34,7 @@ def modes(study: Study, sizes: Sequence[Size]) -> list[str]:
         axes[0].semilogy(found["L"], found["sigma_mm"], color=colour, label=label)
         axes[1].plot(found["L"], found["share_of_sum"], color=colour, label=label)
         chosen = errors[errors["N_train"] == size.shapes]
-        axes[2].semilogy(chosen["L"], chosen["AE_p"], color=colour, label=label)
+        axes[2].semilogy(chosen["L"], chosen["AE_p"], color=colour)
         axes[2].semilogy(chosen["L"], chosen["AE_rb"], color=colour, ls="--")
         axes[3].semilogy(chosen["L"], chosen["AE_gpr"].clip(lower=1e-5), color=colour, label=label)
     theirs = published.table(3)
@@ -112,7 +112,7 @@ def _boxes(
         axis.set_ylabel(f"${column[:2]}_p$ (mm)")
         axis.set_xlabel(what)
         axis.tick_params(axis="x", labelsize=7.5)
-        axis.legend(loc="upper right")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     style.titled(axes[0], "mean over the nodes")
     style.titled(axes[1], "largest of the nodes")
     return [style.save(study, figure, name)]
@@ -198,7 +198,7 @@ def recipes(study: Study) -> list[str]:
         axis.minorticks_off()
         axis.set_xlabel("training shapes")
         axis.set_ylabel(f"${theirs}$ (mm)")
-        axis.legend(loc="lower left")
+        axis.legend(loc="upper right", bbox_to_anchor=(1.0, 0.94))
     style.titled(axes[0], "mean over the nodes")
     style.titled(axes[1], "largest of the nodes")
     return [style.save(study, figure, "recipes")]
