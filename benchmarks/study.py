@@ -56,7 +56,7 @@ def stage_times(folder: Path) -> dict[str, tuple[int, float]]:
 
 def whole(home: Path, samples: int) -> tuple[list[Row], str]:
     """The study of the finished store, and a table of its stages."""
-    arguments = ["--samples", str(samples), "--dataset", str(data_folder("study"))]
+    arguments = ["--samples", str(samples), "--dataset", str(data_folder() / "study")]
     spent = run([*arguments, "-o", str(home / "whole")], home / "whole.json")
     again = run([*arguments, "-o", str(home / "whole")], home / "again.json")
     rows = [
@@ -82,7 +82,7 @@ def killed(home: Path, samples: int, seed: int) -> list[Row]:
         shutil.rmtree(folder, ignore_errors=True)
         chance = random.Random(seed)
         wall = json.loads((home / "whole.json").read_text())["wall"]
-        arguments = ["--samples", str(samples), "--dataset", str(data_folder("study"))]
+        arguments = ["--samples", str(samples), "--dataset", str(data_folder() / "study")]
         command = [*COMMAND, *arguments, "-o", str(folder)]
         done = []
         for _ in range(KILLS):

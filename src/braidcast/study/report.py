@@ -61,7 +61,9 @@ def write(study: Study, sizes: Sequence[Size], middle: Size, samples: int) -> li
     )
     environment.filters["kinds"] = _kinds
     simulations = study.simulations(samples)
-    verdicts = study.table("agreement")["verdict"]
+    found = study.table("agreement")
+    agrees = found["verdict"] == "agrees"
+    smaller = (found["verdict"] == "lower here") & found["finding"].str.match("AE_|ME_|share of t")
     text = environment.get_template("report.html").render(
         title=TITLE,
         samples=samples,
@@ -76,10 +78,10 @@ def write(study: Study, sizes: Sequence[Size], middle: Size, samples: int) -> li
         threshold=threshold_of(OURS),
         missed=len(study.table("false_negatives")),
         forest=study.table("importance")["R2_out_of_bag"].iloc[0],
-        verdicts={"all": len(verdicts), "agrees": int((verdicts == "agrees").sum())},
+        verdicts={"all": len(found), "agree": int(agrees.sum()), "smaller": int(smaller.sum())},
         shipped=_shipped(study.table("shipped")),
         card=_card((study.home / "model_card.md").read_text(encoding="utf-8")),
-        agreement=lambda section: list(_findings(study.table("agreement"), section)),
+        agreement=lambda section: list(_findings(found, section)),
         rows=lambda name: view(name, study.table(name)),
         image=lambda name: _data_uri(study, _file(study, name)),
         file=lambda name: _file(study, name),
