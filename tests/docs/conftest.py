@@ -30,7 +30,7 @@ EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["option
 TARGETS = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
 
 #: What Sphinx makes of it is Sphinx's to check.
-DIRECTIVES = {"{toctree}", "{include}", "{eval-rst}", "{command-line}"}
+DIRECTIVES = {"{toctree}", "{include}", "{eval-rst}", "{command-line}", "{model-card}"}
 
 #: The examples' plan is for minutes; what a page does with it is the same with a few coarse stents.
 THINNED = {
