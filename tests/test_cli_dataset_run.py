@@ -145,8 +145,8 @@ def test_run_shows_how_far_it_is_and_what_came_out(
         return RunReport(tuple(count.done), 6.0, 2)
 
     monkeypatch.setattr(running, "run", work)
-    assert run("run", "data", "--workers", "2", "--retry-failed") == 0
-    assert given == {"workers": 2, "scheduler": None, "retry_failed": True}
+    assert run("run", "data", "--workers", "2", "--retry-failed", "--cases", "4") == 0
+    assert given == {"workers": 2, "scheduler": None, "retry_failed": True, "cases": 4}
     out, err = capsys.readouterr()
     lines = [" ".join(line.split()) for line in out.splitlines()]
     assert lines[0] == "cases 4" and "waiting 0" in lines

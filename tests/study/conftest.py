@@ -16,7 +16,15 @@ SAMPLES = 90
 
 @pytest.fixture(scope="session")
 def client() -> Iterator[Client]:
-    with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None) as one:
+    # Not the default: xarray would hand it what other tests write.
+    one = Client(
+        processes=False,
+        n_workers=1,
+        threads_per_worker=1,
+        dashboard_address=None,
+        set_as_default=False,
+    )
+    with one:
         yield one
 
 
