@@ -21,7 +21,7 @@ def client() -> Iterator[Client]:
         processes=False,
         n_workers=1,
         threads_per_worker=1,
-        dashboard_address=None,
+        dashboard_address="127.0.0.1:0",  # any free port: another worker of the tests may have one
         set_as_default=False,
     )
     with one:
