@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from braidcast.atomic import write_atomically
 from braidcast.case import Case
 from braidcast.deployment.picture import Drawer, Scene, Surface, scene
+from braidcast.study.plots import style
 from braidcast.vessels.surface import vessel_surface
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ NOTHING: Surface = (np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
 DOTS = 170
 """Dots an inch."""
 
-_WIDTH, _ASPECT = 7.2, 0.625
+_ASPECT = 0.625
 
 
 STATES = ("free", "crimped", "straight", "positioned", "deployed")
@@ -141,8 +142,8 @@ def _figure(titles: Sequence[str], below: float = 0.0) -> tuple[Figure, list[Axe
     """Two columns of panels as high as their pictures, titles above, ``below`` inches left free."""
     rows = -(-len(titles) // 2)
     lines = max(title.count("\n") + 1 for title in titles)
-    height = 0.5 * _WIDTH * _ASPECT + 0.1 + 0.16 * lines
-    figure = Figure(figsize=(_WIDTH, rows * height + below), layout="constrained")
+    height = 0.5 * style.WIDTH * _ASPECT + 0.1 + 0.16 * lines
+    figure = Figure(figsize=(style.WIDTH, rows * height + below), layout="constrained")
     axes = list(figure.subplots(rows, 2, squeeze=False).flat)
     for axis in axes:
         axis.set_axis_off()
@@ -154,7 +155,7 @@ def _fill(axes: Sequence[Axes], scenes: Sequence[Scene], titles: Sequence[str]) 
         drawn = drawer.draw(list(scenes), NOTHING)
     for letter, axis, png, title in zip("ABCDEFGHIJ", axes, drawn, titles, strict=False):
         axis.imshow(imread(BytesIO(png)), interpolation="antialiased")
-        axis.set_title(rf"$\bf{{{letter}}}$  {title}", loc="left", fontsize=8.5)
+        axis.set_title(f"{style.bold(letter)}  {title}", loc="left", fontsize=8.5)
 
 
 def _save(figure: Figure, path: Path) -> None:

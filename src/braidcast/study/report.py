@@ -69,7 +69,6 @@ def write(study: Study, sizes: Sequence[Size], middle: Size, samples: int) -> li
         samples=samples,
         plan=DatasetFolder.open(study.dataset).plan_id,
         headings=_HEADINGS,
-        contents=_HEADINGS.items(),
         middle=middle,
         tests={
             "outcomes": len(simulations.classification_tests),

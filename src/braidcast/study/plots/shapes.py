@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from braidcast.study import published
 from braidcast.study.plots import style
-from braidcast.study.shapes import BEST, MODES, PREDICTORS, RESOLUTIONS, file_of
+from braidcast.study.shapes import BEST, MODES, PREDICTORS, REFERENCE, RESOLUTIONS, file_of
 from braidcast.study.sizes import Size
 from braidcast.study.workspace import Study
 
@@ -179,7 +179,9 @@ def recipes(study: Study) -> list[str]:
         for recipe, (label, colour, marker) in _RECIPES.items():
             found = table[table["recipe"] == recipe].sort_values("N_train")
             axis.plot(found["N_train"], found[column], f"{marker}-", color=colour, label=label)
-        axis.plot(146, printed[theirs], "x", color="black", ms=7, mew=1.6, label="paper, printed")
+        axis.plot(
+            REFERENCE, printed[theirs], "x", color="black", ms=7, mew=1.6, label="paper, printed"
+        )
         first = table[table["recipe"] == "ours"].iloc[0]
         axis.axhline(first[f"{column}_geometry"], color=style.PURPLE, lw=1, ls="-.")
         axis.annotate(
