@@ -1,185 +1,89 @@
-"""One case: a vessel, its aneurysm, a device and where it is put. What a user may set."""
+"""One case: a vessel, its aneurysm, a device and where it is put."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from braidcast import feasibility
 from braidcast.case_errors import one_sentence
+from braidcast.case_tables import (
+    FILE_KEYS,
+    Aneurysm,
+    AnyAneurysm,
+    AnyVessel,
+    Device,
+    Site,
+    Table,
+    Vessel,
+    VesselFile,
+    Wall,
+)
 from braidcast.case_toml import toml_text
-from braidcast.devices import Braid, catalogue
+from braidcast.devices import Braid
 from braidcast.errors import InputError
 from braidcast.toml_file import parse, read_text
 from braidcast.vessels import QuadraticBezier, SaccularVessel, Sphere, Tube
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-# TOML has arrays where Python has tuples: the array may be converted, its numbers may not.
-Point = Annotated[
-    tuple[
-        Annotated[Number, Field(ge=-1000.0, le=1000.0)],
-        Annotated[Number, Field(ge=-1000.0, le=1000.0)],
-        Annotated[Number, Field(ge=-1000.0, le=1000.0)],
-    ],
-    Field(strict=False),
-]
+if TYPE_CHECKING:
+    from braidcast.vessels.polyline import Polyline
+    from braidcast.vessels.sacs import Sac
+    from braidcast.vessels.surface_vessel import SurfaceVessel
 
-
-def _point(default: Any = ...) -> Any:
-    return Field(default=default, description="three numbers of mm, each from -1000 to 1000")
-
-
-class Table(BaseModel):
-    """A table of a user's file: every key known, every value of its own type, nothing changed."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-
-class Vessel(Table):
-    """Parent vessel: a round tube about the quadratic Bézier curve P0, P1, P2, all in mm."""
-
-    P0: Point = _point((0.0, 0.0, 0.0))
-    P1: Point = _point()
-    P2: Point = _point((0.0, 0.0, 50.0))
-    diameter: Number = Field(gt=0.0, le=50.0, description="a number of mm above 0, at most 50")
-
-
-class Aneurysm(Table):
-    """Spherical sac of ``diameter`` mm, placed by exactly one of ``protrusion`` and ``centre``.
-
-    ``protrusion`` f puts the centre at R_v + f R_a above (+y) the middle of the centreline by arc
-    length; ``centre`` is a point in mm. ``neck_fillet`` mm rounds the edge of the neck.
-    """
-
-    diameter: Number = Field(gt=0.0, le=100.0, description="a number of mm above 0, at most 100")
-    protrusion: Number | None = Field(
-        default=None, gt=0.0, lt=1.0, description="a number between 0 and 1, both excluded"
-    )
-    centre: Point | None = _point(None)
-    neck_fillet: Number = Field(
-        default=0.2, gt=0.0, le=1.0, description="a number of mm above 0, at most 1"
-    )
-
-    @model_validator(mode="after")
-    def _placed_once(self) -> Self:
-        if (self.protrusion is None) == (self.centre is None):
-            given = "neither" if self.protrusion is None else "both"
-            raise InputError(
-                f"aneurysm.protrusion and aneurysm.centre: {given} given, must be exactly one "
-                "of the two"
-            )
-        return self
-
-
-class Device(Table):
-    """A braid of the catalogue, by ``name``; every other key given replaces that braid's value.
-
-    Lengths in mm, ``young_modulus`` in MPa.
-    """
-
-    name: str = Field(default="paper", description=f"one of: {', '.join(sorted(catalogue))}")
-    wires: int | None = Field(
-        default=None, ge=4, le=400, description="an even whole number from 4 to 400"
-    )
-    radius: Number | None = Field(
-        default=None, gt=0.0, le=50.0, description="a number of mm above 0, at most 50"
-    )
-    length: Number | None = Field(
-        default=None, gt=0.0, le=500.0, description="a number of mm above 0, at most 500"
-    )
-    segments: int | None = Field(
-        default=None, ge=2, le=2000, description="a whole number from 2 to 2000"
-    )
-    wire_radius: Number | None = Field(
-        default=None, gt=0.0, le=1.0, description="a number of mm above 0, at most 1"
-    )
-    young_modulus: Number | None = Field(
-        default=None, gt=0.0, le=1e7, description="a number of MPa above 0, at most 1e7"
-    )
-    poisson_ratio: Number | None = Field(
-        default=None, gt=-1.0, le=0.5, description="a number above -1, at most 0.5"
-    )
-    literal_angle: bool | None = Field(default=None, description="true or false")
-
-    @cached_property
-    def braid(self) -> Braid:
-        """The braid that these keys describe."""
-        if self.name not in catalogue:
-            known = ", ".join(sorted(catalogue))
-            raise InputError(f"device.name = {self.name!r} must be one of: {known}")
-        try:
-            return replace(
-                catalogue[self.name], **self.model_dump(exclude={"name"}, exclude_none=True)
-            )
-        except InputError as error:
-            raise InputError(f"device.{error}") from None
-
-    @model_validator(mode="after")
-    def _is_a_braid(self) -> Self:
-        _ = self.braid
-        return self
-
-
-class Site(Table):
-    """Where the device is released.
-
-    ``eta`` puts ring 0 of the crimped stent at the arc length η (L_centreline − L_crimped −
-    0.5 mm); ``crimped_radius`` is that of the wire axes in mm, 0.3 (radius + wire_radius) if not
-    given.
-    """
-
-    eta: Number = Field(ge=0.0, le=1.0, description="a number from 0 to 1")
-    crimped_radius: Number | None = Field(
-        default=None, gt=0.0, le=50.0, description="a number of mm above 0, at most 50"
-    )
-
-
-class Wall(Table):
-    """Contact of wires and wall: Coulomb's coefficient of friction, 0 allowed."""
-
-    friction: Number = Field(default=0.1, ge=0.0, le=2.0, description="a number from 0 to 2")
+Progress = Callable[[str, float], None]
+"""Called with a stage of reading a vessel's surface, and the share of it that is done."""
 
 
 class Case(Table):
     """Everything a deployment depends on. Build it with ``from_toml`` or ``from_dict``."""
 
     title: str = Field(default="", max_length=200, description="a text of at most 200 characters")
-    vessel: Vessel = Field(description="a table with P1 and diameter")
-    aneurysm: Aneurysm | None = Field(
-        default=None, description="a table with diameter, and protrusion or centre"
+    vessel: AnyVessel = Field(description="a table with P1 and diameter, or with surface")
+    aneurysm: AnyAneurysm | None = Field(
+        default=None,
+        description="a table with diameter, and protrusion or centre; with neck and neck_radius; "
+        "or with surface",
     )
     device: Device = Field(default_factory=Device, description="a table")
     site: Site = Field(description="a table with eta")
     wall: Wall = Field(default_factory=Wall, description="a table")
 
     @model_validator(mode="after")
-    def _is_feasible(self) -> Self:
+    def _is_feasible(self, info: ValidationInfo) -> Self:
+        if isinstance(self.vessel, VesselFile):
+            _ = self._loaded(info.context)
         feasibility.check(self)
         return self
 
     @classmethod
-    def from_toml(cls, path: str | Path) -> Self:
-        """Read the case file at ``path``; ``InputError`` names the file and what is wrong in it."""
+    def from_toml(cls, path: str | Path, progress: Progress | None = None) -> Self:
+        """Read the case file at ``path``; ``InputError`` names the file and what is wrong in it.
+
+        Files that it names are looked for beside it. Reading a vessel's surface for the first time
+        takes some seconds, of which ``progress`` is told.
+        """
         try:
             text = read_text(Path(path), "case file", "the tables [vessel] and [site]")
-            return cls.from_dict(parse(text, "case file"))
+            return cls.from_dict(beside(Path(path).parent, parse(text, "case file")), progress)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Build the case from the tables of a case file; ``InputError`` says what is wrong."""
+    def from_dict(cls, data: Mapping[str, Any], progress: Progress | None = None) -> Self:
+        """Build the case from the tables of a case file; ``InputError`` says what is wrong.
+
+        Files that they name are looked for in the current folder.
+        """
         if not isinstance(data, Mapping):
             raise InputError(f"a case must be a mapping of tables, not {type(data).__name__}")
         try:
-            return cls.model_validate(dict(data))
+            return cls.model_validate(dict(data), context=progress)
         except ValidationError as error:
             raise InputError(one_sentence(error, cls, data)) from None
 
@@ -196,37 +100,110 @@ class Case(Table):
         """The device, free of load."""
         return self.device.braid
 
+    @property
+    def tube(self) -> Vessel:
+        """The table of a vessel about a Bézier curve; ``InputError`` for one from a surface."""
+        if isinstance(self.vessel, VesselFile):
+            raise InputError(
+                f"vessel.surface = {self.vessel.surface} is a vessel of its own shape, must be one "
+                "with P1 and diameter here: a surrogate knows no other"
+            )
+        return self.vessel
+
+    @property
+    def sac(self) -> Aneurysm:
+        """The table of a spherical aneurysm; ``InputError`` without one."""
+        if not isinstance(self.aneurysm, Aneurysm):
+            raise InputError("aneurysm is missing; the surrogate needs one, with a diameter")
+        return self.aneurysm
+
     @cached_property
-    def centreline(self) -> QuadraticBezier:
-        """Centreline of the parent vessel."""
-        points = (np.array(point) for point in (self.vessel.P0, self.vessel.P1, self.vessel.P2))
+    def bezier(self) -> QuadraticBezier:
+        """Centreline of a vessel about a Bézier curve; ``InputError`` for one from a surface."""
+        points = (np.array(point) for point in (self.tube.P0, self.tube.P1, self.tube.P2))
         try:
             return QuadraticBezier(*points)
         except InputError as error:
             raise InputError(f"vessel.{error}") from None
 
+    @property
+    def vessel_radius(self) -> float:
+        """R_v, mm; ``InputError`` for a vessel from a surface, whose radius varies."""
+        return self.tube.diameter / 2.0
+
+    @property
+    def centreline(self) -> QuadraticBezier | Polyline:
+        """Centreline of the parent vessel."""
+        if isinstance(self.vessel, VesselFile):
+            return self._loaded().centreline
+        return self.bezier
+
     @cached_property
-    def vessel_geometry(self) -> SaccularVessel:
-        """The lumen: tube and, if there is one, aneurysm."""
-        tube = Tube(self.centreline, self.vessel_radius)
-        if self.aneurysm is None or self.aneurysm_centre is None:
+    def surface_geometry(self) -> SurfaceVessel:
+        """The lumen within the surface of ``[vessel]``, which must be given by one."""
+        return self._loaded().with_aneurysm(self._region())
+
+    @cached_property
+    def vessel_geometry(self) -> SaccularVessel | SurfaceVessel:
+        """The lumen: tube and, if there is one, aneurysm; or that of the surface."""
+        if isinstance(self.vessel, VesselFile):
+            return self.surface_geometry
+        tube = Tube(self.bezier, self.vessel_radius)
+        if not isinstance(self.aneurysm, Aneurysm) or self.aneurysm_centre is None:
             return SaccularVessel(tube)
         sphere = Sphere(self.aneurysm_centre, self.aneurysm.diameter / 2.0)
         return SaccularVessel(tube, sphere, self.aneurysm.neck_fillet)
 
-    @property
-    def vessel_radius(self) -> float:
-        """R_v, mm."""
-        return self.vessel.diameter / 2.0
+    def _loaded(self, progress: Progress | None = None) -> SurfaceVessel:
+        # Not at the top: vessels about Bézier curves need none of it.
+        from braidcast.vessels.surface_vessel import SurfaceSource, load_vessel
+
+        table = self.vessel
+        assert isinstance(table, VesselFile)
+        source = SurfaceSource(
+            table.surface,
+            table.units,
+            table.centreline,
+            table.ends,
+            table.distance_spacing,
+            self.braid.wire_radius,
+        )
+        try:
+            return load_vessel(source, progress)
+        except InputError as error:
+            raise InputError(f"vessel.{error}") from None
+
+    def _region(self) -> Sac | None:
+        """What counts as the sac of a vessel from a surface."""
+        from braidcast.vessels.sacs import ClosedSac, NeckSac
+
+        if isinstance(self.aneurysm, Aneurysm):
+            if self.aneurysm.centre is None:
+                raise InputError(
+                    f"aneurysm.protrusion = {self.aneurysm.protrusion} is for a vessel about a "
+                    "Bézier curve, must be centre in one from a surface"
+                )
+            return Sphere(np.array(self.aneurysm.centre), self.aneurysm.diameter / 2.0)
+        if self.aneurysm is None:
+            return None
+        if self.aneurysm.surface is None:
+            line = self._loaded().centreline
+            assert self.aneurysm.neck is not None and self.aneurysm.neck_radius is not None
+            return NeckSac(np.array(self.aneurysm.neck), self.aneurysm.neck_radius, line)
+        try:
+            assert isinstance(self.vessel, VesselFile)
+            return ClosedSac.read(self.aneurysm.surface, self.vessel.units)
+        except InputError as error:
+            raise InputError(f"aneurysm.{error}") from None
 
     @cached_property
     def aneurysm_centre(self) -> NDArray[np.float64] | None:
-        """Centre C_a of the sac, (3,) mm; None without an aneurysm."""
-        if self.aneurysm is None:
+        """Centre C_a of a spherical sac, (3,) mm; None without one."""
+        if not isinstance(self.aneurysm, Aneurysm):
             return None
         if self.aneurysm.centre is not None:
             return np.array(self.aneurysm.centre)
-        middle = self.centreline.at_arc_length(self.centreline.length / 2.0)[0]
+        middle = self.bezier.at_arc_length(self.bezier.length / 2.0)[0]
         assert self.aneurysm.protrusion is not None
         height = self.vessel_radius + self.aneurysm.protrusion * self.aneurysm.diameter / 2.0
         return middle + np.array([0.0, height, 0.0])
@@ -243,7 +220,36 @@ class Case(Table):
         return self.braid.crimped_length(self.crimped_radius)
 
     @property
+    def spare_length(self) -> float:
+        """Length of the centreline beyond the crimped device and what must stay free, mm."""
+        return self.centreline.length - self.crimped_length - feasibility.MARGIN
+
+    @cached_property
     def start_arc_length(self) -> float:
-        """Arc length from P0 at which ring 0 of the crimped device is put, mm."""
-        spare = self.centreline.length - self.crimped_length - feasibility.MARGIN
-        return self.site.eta * spare
+        """Arc length at which ring 0 of the crimped device is put, mm."""
+        site = self.site
+        if site.proximal_end_mm is not None:
+            return site.proximal_end_mm
+        if site.distal_end_mm is not None:
+            return site.distal_end_mm - self.crimped_length
+        if site.point is not None:
+            return float(self.centreline.closest(site.point)[1][0]) - 0.5 * self.crimped_length
+        assert site.eta is not None
+        return site.eta * self.spare_length
+
+    @property
+    def eta(self) -> float:
+        """η of the site, however it was given."""
+        if self.site.eta is not None:
+            return self.site.eta
+        return self.start_arc_length / self.spare_length if self.spare_length > 0.0 else 0.0
+
+
+def beside(folder: Path, tables: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables of a case, the files that they name looked for in ``folder``."""
+    found = dict(tables)
+    for table, key in FILE_KEYS:
+        values = found.get(table)
+        if isinstance(values, Mapping) and isinstance(values.get(key), str):
+            found[table] = {**values, key: str(folder / values[key])}
+    return found

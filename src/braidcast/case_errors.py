@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import date, time
 from difflib import get_close_matches
+from itertools import pairwise
 from typing import Any, get_args
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Tag, ValidationError
 from pydantic.fields import FieldInfo
 
 from braidcast.errors import InputError
@@ -28,10 +29,12 @@ def one_sentence(
     cause = mistake.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
         return str(cause)
-    keys = [str(key) for key in mistake["loc"] if isinstance(key, str)]
+    place = [key for key in mistake["loc"] if isinstance(key, str)]
+    keys = [key for key in place if not key.startswith("<")]
     name = ".".join(keys)
     if mistake["type"] == "extra_forbidden":
-        return f"{name} is not a known key; {_suggestion(keys, model, whole)}"
+        here = _model_at(place[:-1], model)
+        return f"{name} is not a known key; {_suggestion(keys, here, model, whole)}"
     rule = _rule(keys, model)
     value = _value(keys, data)
     if value is _missing:
@@ -39,14 +42,13 @@ def one_sentence(
     return f"{name} = {shown(value)} must be {rule}"
 
 
-def _suggestion(keys: list[str], model: type[BaseModel], whole: str) -> str:
-    """The known key that was probably meant, or the keys that are allowed there."""
+def _suggestion(keys: list[str], here: type[BaseModel], model: type[BaseModel], whole: str) -> str:
+    """The known key that was probably meant, or the keys that are allowed there, in ``here``."""
     *table, key = keys
     known = {".".join(path): path for path in _paths(model)}
     for name, path in known.items():
         if path[-1].lower() == key.lower():
             return f"did you mean {name}?"
-    here = _model_at(table, model)
     near = get_close_matches(key, here.model_fields, n=1)
     if near:
         return f"did you mean {'.'.join([*table, near[0]])}?"
@@ -60,34 +62,40 @@ def _suggestion(keys: list[str], model: type[BaseModel], whole: str) -> str:
 def _paths(model: type[BaseModel]) -> Iterator[tuple[str, ...]]:
     for name in model.model_fields:
         yield (name,)
-        table = _table(model, name)
-        if table is not None:
+        for _, table in _tables(model, name):
             yield from ((name, *path) for path in _paths(table))
 
 
-def _table(model: type[BaseModel], name: str) -> type[BaseModel] | None:
-    """The model behind a field that is a table, or None."""
-    annotation = model.model_fields[name].annotation
-    for kind in (annotation, *get_args(annotation)):
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            return kind
-    return None
+def _tables(model: type[BaseModel], name: str) -> list[tuple[str, type[BaseModel]]]:
+    """The models behind a field that is a table, each with its tag; none for another field."""
+    field = model.model_fields.get(name)
+    return list(_tagged(field.annotation)) if field else []
 
 
-def _model_at(keys: list[str], model: type[BaseModel]) -> type[BaseModel]:
-    for key in keys:
-        model = _table(model, key) or model
+def _tagged(annotation: Any, tag: str = "") -> Iterator[tuple[str, type[BaseModel]]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield tag, annotation
+    for note in getattr(annotation, "__metadata__", ()):
+        tag = note.tag if isinstance(note, Tag) else tag
+    for kind in get_args(annotation):
+        yield from _tagged(kind, tag)
+
+
+def _model_at(place: Sequence[str], model: type[BaseModel]) -> type[BaseModel]:
+    """The model at a place of pydantic's, in which a kind's tag follows the key of its table."""
+    for key, following in pairwise([*place, ""]):
+        tables = _tables(model, key)
+        model = next((table for tag, table in tables if tag in ("", following)), model)
     return model
 
 
 def field_at(keys: Sequence[str], model: type[BaseModel]) -> FieldInfo | None:
     """The field of ``model`` at ``keys``, or None if there is no such field."""
-    for key in keys[:-1]:
-        table = _table(model, key) if key in model.model_fields else None
-        if table is None:
-            return None
-        model = table
-    return model.model_fields.get(keys[-1])
+    first, *others = keys
+    if not others:
+        return model.model_fields.get(first)
+    found = (field_at(others, table) for _, table in _tables(model, first))
+    return next((field for field in found if field is not None), None)
 
 
 def _rule(keys: list[str], model: type[BaseModel]) -> str:

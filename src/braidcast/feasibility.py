@@ -7,30 +7,41 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from braidcast.case_tables import SacRegion, Vessel
 from braidcast.errors import InputError
 
 if TYPE_CHECKING:
     from braidcast.case import Case
+    from braidcast.vessels.surface_vessel import SurfaceVessel
 
 #: Length of vessel, mm, that the crimped device leaves free at the least.
 MARGIN = 0.5
 
+#: Distance between places along the centreline that are looked at, mm.
+_STEP = 0.1
+
 
 def check(case: Case) -> None:
     """Raise ``InputError`` for the first thing that makes the deployment impossible."""
-    _vessel_bends_gently(case)
     _crimped_device_exists(case)
-    _device_fits_across(case)
+    if isinstance(case.vessel, Vessel):
+        _tube_bends_gently(case)
+        _device_fits_across_tube(case)
+        _device_fits_along(case)
+        if case.aneurysm is not None:
+            _aneurysm_is_saccular(case)
+        return
+    vessel = case.surface_geometry
     _device_fits_along(case)
-    if case.aneurysm is not None:
-        _aneurysm_is_saccular(case)
+    _device_fits_across_surface(case, vessel)
+    _sac_meets_vessel(case, vessel)
 
 
-def _vessel_bends_gently(case: Case) -> None:
-    curvature = case.centreline.max_curvature
+def _tube_bends_gently(case: Case) -> None:
+    curvature = case.bezier.max_curvature
     if case.vessel_radius * curvature >= 1.0:
         raise InputError(
-            f"vessel.P1 = {list(case.vessel.P1)} bends the centreline to a radius of "
+            f"vessel.P1 = {list(case.tube.P1)} bends the centreline to a radius of "
             f"{1.0 / curvature:.3g} mm, must be more than the vessel's radius of "
             f"{case.vessel_radius:.4g} mm"
         )
@@ -47,15 +58,14 @@ def _crimped_device_exists(case: Case) -> None:
         )
 
 
-def _device_fits_across(case: Case) -> None:
-    braid, diameter = case.braid, case.vessel.diameter
-    least = 2.0 * (case.crimped_radius + 2.0 * braid.wire_radius)
+def _device_fits_across_tube(case: Case) -> None:
+    diameter = case.tube.diameter
+    least, most = 2.0 * _least_radius(case), 2.0 * _most_radius(case)
     if diameter <= least:
         raise InputError(
             f"vessel.diameter = {diameter:.6g} mm must be above {least:.4g} mm, the crimped "
             "stent and a wire either side"
         )
-    most = 2.0 * (braid.axis_radius + braid.wire_radius)
     if diameter >= most:
         raise InputError(
             f"vessel.diameter = {diameter:.6g} mm must be below {most:.4g} mm, the free stent's, "
@@ -63,19 +73,103 @@ def _device_fits_across(case: Case) -> None:
         )
 
 
+def _least_radius(case: Case) -> float:
+    """Of a lumen in which the crimped device has a wire's thickness of room, mm."""
+    return case.crimped_radius + 2.0 * case.braid.wire_radius
+
+
+def _most_radius(case: Case) -> float:
+    """Of a lumen that the free device still touches, mm."""
+    return case.braid.axis_radius + case.braid.wire_radius
+
+
 def _device_fits_along(case: Case) -> None:
-    needed, length = case.crimped_length + MARGIN, case.centreline.length
-    if length < needed:
+    length, spare, start = case.centreline.length, case.spare_length, case.start_arc_length
+    if spare < 0.0:
         raise InputError(
             f"device.length = {case.braid.length:.6g} mm gives a stent of "
             f"{case.crimped_length:.4g} mm when crimped, must be at most {length - MARGIN:.4g} mm: "
             f"the vessel's centreline is {length:.4g} mm long and {MARGIN} mm stay free"
         )
+    if 0.0 <= start <= spare:
+        return
+    site, far = case.site, spare + case.crimped_length
+    if site.proximal_end_mm is not None:
+        field, value, limits = "proximal_end_mm", f"{site.proximal_end_mm} mm", (0.0, spare)
+    elif site.distal_end_mm is not None:
+        field, value = "distal_end_mm", f"{site.distal_end_mm} mm"
+        limits = (case.crimped_length, far)
+    else:
+        middle = 0.5 * case.crimped_length
+        field, value = "point", f"{list(site.point or ())}, at {start + middle:.4g} mm of the line,"
+        limits = (middle, spare + middle)
+    raise InputError(
+        f"site.{field} = {value} must be from {limits[0]:.4g} to {limits[1]:.4g} mm along the "
+        f"centreline of {length:.4g} mm, or the crimped stent of {case.crimped_length:.4g} mm "
+        "reaches beyond its ends"
+    )
+
+
+def _device_fits_across_surface(case: Case, vessel: SurfaceVessel) -> None:
+    line, start = vessel.centreline, case.start_arc_length
+    along = np.arange(start, start + case.crimped_length + _STEP, _STEP)
+    places, lumen = line.at_arc_length(along), line.lumen_radius(along)
+    room = -vessel.distance(places)
+    least, most = _least_radius(case), _most_radius(case)
+    narrowest = int(room.argmin())
+    if room[narrowest] <= least:
+        raise InputError(
+            f"vessel.surface = {vessel.name} leaves {room[narrowest]:.4g} mm about the centreline "
+            f"at {along[narrowest]:.4g} mm of it, {_place(places[narrowest])}, must leave more "
+            f"than {least:.4g} mm, the crimped stent and a wire"
+        )
+    if lumen.min() >= most:
+        raise InputError(
+            f"vessel.surface = {vessel.name} has a lumen of {lumen.min():.4g} mm radius or more "
+            f"where the stent is put, must have less than {most:.4g} mm somewhere, the free "
+            "stent's, or the stent lies loose"
+        )
+    bend = line.curvature_at_arc_length(along)
+    tightest = int((bend * case.crimped_radius).argmax())
+    if bend[tightest] * least >= 1.0:
+        raise InputError(
+            f"vessel.surface = {vessel.name} has a centreline of {1.0 / bend[tightest]:.3g} mm "
+            f"radius at {along[tightest]:.4g} mm of it, {_place(places[tightest])}, must be above "
+            f"{least:.4g} mm, the crimped stent's"
+        )
+
+
+def _sac_meets_vessel(case: Case, vessel: SurfaceVessel) -> None:
+    table, sac = case.aneurysm, vessel.aneurysm
+    if table is None or sac is None:
+        return
+    away, along = vessel.centreline.closest(sac.centre)
+    lumen = float(vessel.centreline.lumen_radius(along)[0])
+    if isinstance(table, SacRegion) and table.neck is not None:
+        field, most = f"neck = {list(table.neck)}", 2.0 * lumen
+    elif isinstance(table, SacRegion):
+        field, most = f"surface = {table.surface}", lumen + sac.radius
+    else:
+        field, most = f"centre = {sac.centre.tolist()}", lumen + sac.radius
+    if away[0] >= most:
+        raise InputError(
+            f"aneurysm.{field} is {away[0]:.4g} mm from the vessel's centreline, must be below "
+            f"{most:.4g} mm, or it is not at this vessel"
+        )
+
+
+def _place(point: np.ndarray) -> str:
+    return f"({', '.join(f'{x:.2f}' for x in point)}) mm"
 
 
 def _aneurysm_is_saccular(case: Case) -> None:
-    centre, table, vessel = case.aneurysm_centre, case.aneurysm, case.vessel_radius
-    assert table is not None and centre is not None
+    if isinstance(case.aneurysm, SacRegion):
+        raise InputError(
+            "aneurysm.neck and aneurysm.surface are for a vessel from a surface, must be diameter "
+            "and protrusion, or diameter and centre, in one about a Bézier curve"
+        )
+    centre, table, vessel = case.aneurysm_centre, case.sac, case.vessel_radius
+    assert centre is not None
     sac = table.diameter / 2.0
     if table.centre is not None:
         field = f"aneurysm.centre = {list(table.centre)}"
@@ -92,7 +186,7 @@ def _aneurysm_is_saccular(case: Case) -> None:
             f"aneurysm.neck_fillet = {table.neck_fillet} mm must be below {min(vessel, sac):.4g} "
             "mm, the smaller radius of vessel and sac"
         )
-    ends = [np.linalg.norm(centre - np.array(end)) for end in (case.vessel.P0, case.vessel.P2)]
+    ends = [np.linalg.norm(centre - np.array(end)) for end in (case.tube.P0, case.tube.P2)]
     if min(ends) <= vessel + sac:
         raise InputError(
             f"{field} puts the sac's centre {min(ends):.4g} mm from an end of the vessel, must be "

@@ -10,8 +10,9 @@ from typing import Annotated, Any, Self, get_args
 
 from pydantic import Field, ValidationError
 
-from braidcast.case import Case, Table
+from braidcast.case import Case
 from braidcast.case_errors import field_at, one_sentence, shown
+from braidcast.case_tables import FILE_KEYS, Table
 from braidcast.errors import InputError
 from braidcast.toml_file import parse, read_text
 
@@ -101,6 +102,7 @@ class Plan:
         except ValidationError as error:
             raise InputError(one_sentence(error, _PlanFile, data, "a plan")) from None
         try:
+            _check_files(given.case)
             ranges = _ranges(given.case)
         except InputError as error:
             raise InputError(f"[case] {error}") from None
@@ -183,12 +185,28 @@ def _ends(place: _Place, value: Mapping[str, Any]) -> tuple[float, float]:
     return low, high
 
 
+#: Tables whose keys go together or not whatever the values are.
+_WHOLE = (("vessel",), ("aneurysm",), ("site",))
+
+
+def _check_files(tables: Mapping[str, Any]) -> None:
+    for table, key in FILE_KEYS:
+        values = tables.get(table)
+        name = values.get(key) if isinstance(values, Mapping) else None
+        if isinstance(name, str) and not Path(name).is_absolute():
+            raise InputError(
+                f"{table}.{key} = {name} must be an absolute path in a plan, whose cases may be "
+                "run from anywhere"
+            )
+
+
 def _check_fields(tables: Mapping[str, Any]) -> None:
     """Check each field by itself; whether they go together is another question in each case."""
     try:
         Case.model_validate(tables)
     except ValidationError as error:
-        if any(m["type"] != "value_error" for m in error.errors(include_url=False)):
+        mistakes = error.errors(include_url=False)
+        if any(m["type"] != "value_error" or m["loc"][:1] in _WHOLE for m in mistakes):
             raise InputError(one_sentence(error, Case, tables)) from None
 
 

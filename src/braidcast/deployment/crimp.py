@@ -6,7 +6,6 @@ crimped radius alone, so it is computed once and kept.
 """
 
 import hashlib
-import os
 from contextlib import suppress
 from dataclasses import astuple, replace
 from io import BytesIO
@@ -14,9 +13,9 @@ from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
-from platformdirs import user_cache_path
 
 from braidcast.atomic import write_atomically
+from braidcast.cache_folder import cache_folder
 from braidcast.deployment.net import braid_net
 from braidcast.devices import Braid
 from braidcast.errors import InputError
@@ -94,7 +93,7 @@ def crimped_state(
 
     Raises CrimpingFailed if crimping does not converge.
     """
-    path = (cache or _user_cache()) / _cache_name(braid, crimped_radius)
+    path = (cache or cache_folder()) / _cache_name(braid, crimped_radius)
     try:
         with path.open("rb") as kept, np.load(kept, allow_pickle=False) as stored:
             return State(stored["positions"], stored["rotations"])
@@ -111,11 +110,6 @@ def crimped_state(
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content.getvalue())
     return result.state
-
-
-def _user_cache() -> Path:
-    folder = os.environ.get("BRAIDCAST_CACHE")
-    return Path(folder) if folder else user_cache_path("braidcast")
 
 
 def _cache_name(braid: Braid, crimped_radius: float) -> str:

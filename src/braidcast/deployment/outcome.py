@@ -6,15 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from braidcast.case import Case
+from braidcast.case_tables import VesselFile
 from braidcast.mechanics.rotations import Array
 
 APPOSED = 0.1
 """An end farther than this from the wall, mm, is not apposed (clinical label)."""
 
+NOT_ASSESSED = "not assessed"
+
 
 @dataclass(frozen=True)
 class Outcome:
-    """Both labels, each "success" or "failure", and the end nodes found in the sac."""
+    """Both labels, "success", "failure" or "not assessed", and the end nodes found in the sac."""
 
     label: str
     clinical_label: str
@@ -26,13 +29,16 @@ def outcome(case: Case, positions: Array, wire_distance: Array) -> Outcome:
 
     The paper's failure: a node of an end ring lies in the sac, R_a - |C_a - x| - r_w >= 0. The
     clinical one: such a node is also off the wall of the parent vessel, or a whole end ring stands
-    off the wall on average.
+    off the wall on average. In a vessel from a surface they are not assessed unless it is said
+    what its sac is.
     """
+    if case.aneurysm is None and isinstance(case.vessel, VesselFile):
+        return Outcome(NOT_ASSESSED, NOT_ASSESSED, 0)
     braid = case.braid
     ends = np.array(braid.end_nodes)
     in_sac = np.isin(ends, end_nodes_in_sac(case, positions))
-    parent = case.vessel_geometry.tube
-    off_parent = np.abs(parent.distance(positions[ends]) + braid.wire_radius) > APPOSED
+    parent = case.vessel_geometry.parent_distance(positions[ends])
+    off_parent = np.abs(parent + braid.wire_radius) > APPOSED
     rings = np.array(braid.rings)[ends]
     standing_off = any(
         wire_distance[ends[rings == ring]].mean() > APPOSED for ring in np.unique(rings)
@@ -47,8 +53,7 @@ def end_nodes_in_sac(case: Case, positions: Array) -> NDArray[np.int64]:
     ends, sac = np.array(case.braid.end_nodes), case.vessel_geometry.aneurysm
     if sac is None:
         return ends[:0]
-    depth = sac.radius - np.linalg.norm(positions[ends] - sac.centre, axis=1)
-    return ends[depth - case.braid.wire_radius >= 0.0]
+    return ends[sac.depth(positions[ends]) - case.braid.wire_radius >= 0.0]
 
 
 def _word(failed: bool) -> str:

@@ -58,7 +58,7 @@ class Scene:
     lines: tuple[str, ...]
     """Small print below the title."""
     along: Array
-    """From P0 to P2, (3,)."""
+    """From one end to the other, of the vessel or of the part of it in view, (3,)."""
     upward: Array
     """To the side of the vessel that is shown above, (3,)."""
     sac: tuple[Array, float] | None
@@ -82,13 +82,17 @@ def scene(
     lines: tuple[str, ...],
 ) -> Scene:
     """The braid of a case at nodes (N, 3) mm with values (N,), seen with the sac upwards."""
-    from braidcast.deployment.shape import nodes_of_wires  # not for the process that draws
+    # Not for the process that draws.
+    from braidcast.case_tables import Vessel
+    from braidcast.deployment.shape import nodes_of_wires
 
-    centreline, sac = case.centreline, case.vessel_geometry.aneurysm
-    if sac is not None:
-        upward = sac.centre - centreline.at_arc_length(centreline.length / 2.0)[0]
-    else:
-        upward = centreline.P1 - 0.5 * (centreline.P0 + centreline.P2)
+    sac, line = case.vessel_geometry.aneurysm, case.centreline
+    ends = case.start_arc_length + np.array([0.0, 0.5, 1.0]) * case.crimped_length
+    if isinstance(case.vessel, Vessel):
+        ends = np.array([0.0, 0.5, 1.0]) * line.length
+    first, middle, last = line.at_arc_length(ends)
+    # Without a sac the bend itself is shown from the side.
+    upward = (middle - 0.5 * (first + last)) if sac is None else sac.centre - middle
     title = " ".join(case.title.split()) or "Deployed stent"
     return Scene(
         positions=positions,
@@ -99,7 +103,7 @@ def scene(
         limits=limits,
         title=shortened(title, 80),
         lines=lines,
-        along=centreline.P2 - centreline.P0,
+        along=last - first,
         upward=upward,
         sac=None if sac is None else (sac.centre, sac.radius),
     )

@@ -41,12 +41,14 @@ MOST_DRAG, LEAST_DRAG = 32.0, 1.0 / 32.0
 class ReleaseOptions:
     """Accuracy of the release.
 
-    ``duration`` in natural times of the braid (drag against the bending of its rings); ``move``
+    ``duration`` in natural times of the braid (drag against the bending of its rings), the least;
+    ``rest`` how far, mm, a node may still be about to go in as long again; ``move``
     the largest step of a node, mm; ``tolerance`` the unbalanced force of a step, in EI/R^2 a wire;
     ``balance`` that of the final equilibrium, as a share of the sum of the contact forces.
     """
 
     duration: float = 12.0
+    rest: float = 0.005
     move: float = 0.3
     tolerance: float = 0.00625
     balance: float = 1e-5
@@ -109,6 +111,7 @@ def release(
         newton=newton_options,
         free=free,
         held=40.0 * newton_options.tolerance,
+        rest=options.rest if system.problem.contacts[0].friction > 0.0 else np.inf,
     )
     motion = relax(_softened(system, YIELDING), positioned, opening, axial=axial, progress=progress)
     if not motion.completed:

@@ -11,7 +11,7 @@ import braidcast
 def fingerprint() -> str:
     """Sixteen hexadecimal digits that change with the sources a deployment is computed by."""
     package = Path(braidcast.__file__).parent
-    files = [package / "case.py"]
+    files = [package / "case.py", package / "case_tables.py"]
     for layer in ("mechanics", "devices", "vessels", "deployment"):
         files += sorted((package / layer).glob("*.py"))
     digest = hashlib.sha256()

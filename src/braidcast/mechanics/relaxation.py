@@ -20,6 +20,9 @@ from braidcast.mechanics.equilibrium import (
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import Springs, System
 
+DOUBLINGS = 3
+"""So often a motion not yet at rest at the end of its duration goes on for as long again."""
+
 
 @dataclass(frozen=True)
 class RelaxationOptions:
@@ -30,7 +33,8 @@ class RelaxationOptions:
     a step may be than the last. A step whose equilibrium is not found is shortened. ``newton``
     says how exactly a step is solved, ``free`` how exactly while nothing touches a wall: what is
     unbalanced then is stretch of the wires, and the next step takes it out. ``held`` N is how much
-    unbalanced force friction may hold at the end.
+    unbalanced force friction may hold at the end. Where at the last speed a node would go farther
+    than ``rest`` mm in as long again, the motion goes on for as long again, three times at most.
     """
 
     drag: float
@@ -40,6 +44,7 @@ class RelaxationOptions:
     newton: NewtonOptions
     free: NewtonOptions
     held: float
+    rest: float = np.inf
     growth: float = 2.0
     shortest_step: float = 1e-6
 
@@ -75,10 +80,11 @@ def relax(
     memories = system.at_rest(start)
     drag = np.full(len(start.positions), options.drag)
     state, time, step = start, 0.0, options.first_step
+    duration, longest = options.duration, 2.0**DOUBLINGS * options.duration
     steps = iterations = 0
     path: list[Array] = []
     while True:
-        step = min(step, options.duration - time)
+        step = min(step, duration - time)
         springs = Springs(drag / step, state.positions)
         accuracy = options.newton if touching else options.free
         attempt = newton(system, state, accuracy, axial=axial, springs=springs, memories=memories)
@@ -114,9 +120,11 @@ def relax(
         path.append(state.positions)
         if progress is not None:
             scale = options.first_step
-            progress(float(np.log1p(time / scale) / np.log1p(options.duration / scale)))
-        if time >= options.duration * (1.0 - 1e-12):
-            return Relaxation(last, True, "the time is over", steps, iterations, tuple(path))
+            progress(float(np.log1p(time / scale) / np.log1p(duration / scale)))
+        if time >= duration * (1.0 - 1e-12):
+            if duration == longest or move / step * duration <= options.rest:
+                return Relaxation(last, True, "the time is over", steps, iterations, tuple(path))
+            duration *= 2.0
         step *= min(options.growth, max(0.3, far / max(move, 1e-12)))
 
 

@@ -82,14 +82,14 @@ def cases_table(study: Study, samples: int) -> list[str]:
         {
             "case": found.numbers,
             "test": found.test.astype(int),
-            "y_P1_mm": [case.vessel.P1[1] for case in found.cases],
-            "z_P1_mm": [case.vessel.P1[2] for case in found.cases],
+            "y_P1_mm": [case.tube.P1[1] for case in found.cases],
+            "z_P1_mm": [case.tube.P1[2] for case in found.cases],
             "D_v_mm": [2.0 * case.vessel_radius for case in found.cases],
-            "D_a_mm": [case.aneurysm.diameter for case in found.cases if case.aneurysm],
+            "D_a_mm": [case.sac.diameter for case in found.cases],
             "y_Ca_mm": [
                 case.aneurysm_centre[1] for case in found.cases if case.aneurysm_centre is not None
             ],
-            "eta": [case.site.eta for case in found.cases],
+            "eta": [case.eta for case in found.cases],
             "depth_first_mm": depths[:, 0],
             "depth_last_mm": depths[:, 1],
             "success": found.success.astype(int),

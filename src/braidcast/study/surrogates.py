@@ -110,7 +110,7 @@ def examples(study: Study, size: Size) -> list[str]:
                 "case": number,
                 "recipe": recipe,
                 "D_v_mm": 2.0 * case.vessel_radius,
-                "D_a_mm": case.aneurysm.diameter if case.aneurysm else np.nan,
+                "D_a_mm": case.sac.diameter,
                 "AE": distance.mean(),
                 "ME": distance.max(),
             }

@@ -28,7 +28,7 @@ def vessel(study: Study) -> list[str]:
         axis.grid(False)
         axis.contour(z, y, distance, [0.0], colors="black", linewidths=1.8)
     _parameters(axes[0], case, distance, z, y)
-    axes[0].set_ylim(y[0], max(y[-1], case.centreline.P1[1] + _MARGIN))
+    axes[0].set_ylim(y[0], max(y[-1], case.bezier.P1[1] + _MARGIN))
     levels = np.arange(np.floor(2.0 * distance.min()) / 2.0, 2.01, 0.5)
     reach = max(abs(levels[0]), levels[-1])
     filled = axes[1].contourf(z, y, distance, levels, cmap="RdBu", vmin=-reach, vmax=reach)
@@ -42,7 +42,7 @@ def vessel(study: Study) -> list[str]:
 
 def _section(case: Case) -> tuple[Array, Array, Array]:
     """z (n,), y (m,) and the distance (m, n), mm."""
-    line, sac = case.centreline, case.vessel_geometry.aneurysm
+    line, sac = case.bezier, case.vessel_geometry.aneurysm
     points = line.at_arc_length(np.linspace(0.0, line.length, 200))
     centres = points if sac is None else np.vstack([points, sac.centre])
     reach = np.full(len(centres), case.vessel_radius)
@@ -57,7 +57,7 @@ def _section(case: Case) -> tuple[Array, Array, Array]:
 
 def _parameters(axis: Axes, case: Case, distance: Array, z: Array, y: Array) -> None:
     axis.contourf(z, y, distance, [-1e3, 0.0], colors=["#f3e0d8"])
-    line, sac = case.centreline, case.vessel_geometry.aneurysm
+    line, sac = case.bezier, case.vessel_geometry.aneurysm
     points = line.at_arc_length(np.linspace(0.0, line.length, 200))
     axis.plot(points[:, 2], points[:, 1], color=style.BLUE, lw=1.2)
     control = np.array([line.P0, line.P1, line.P2])

@@ -65,19 +65,18 @@ def fields(case: Case) -> dict[str, float]:
     points = {
         f"vessel_{point}_{axis}": float(value)
         for point in ("P0", "P1", "P2")
-        for axis, value in zip("xyz", getattr(case.vessel, point), strict=True)
+        for axis, value in zip("xyz", getattr(case.tube, point), strict=True)
     }
-    if case.aneurysm is None or case.aneurysm_centre is None:
-        raise InputError("aneurysm is missing; the surrogate needs one")
+    sac, centre = case.sac, case.aneurysm_centre
     middle = case.centreline.at_arc_length(0.5 * case.centreline.length)[0]
-    away = case.aneurysm_centre - middle
+    away = centre - middle
     return points | {
-        "vessel_diameter": case.vessel.diameter,
-        "aneurysm_diameter": case.aneurysm.diameter,
-        "aneurysm_protrusion": 2.0 * (away[1] - case.vessel_radius) / case.aneurysm.diameter,
+        "vessel_diameter": case.tube.diameter,
+        "aneurysm_diameter": sac.diameter,
+        "aneurysm_protrusion": 2.0 * (away[1] - case.vessel_radius) / sac.diameter,
         "aneurysm_aside": float(np.hypot(away[0], away[2])),
-        "aneurysm_neck_fillet": case.aneurysm.neck_fillet,
-        "site_eta": case.site.eta,
+        "aneurysm_neck_fillet": sac.neck_fillet,
+        "site_eta": case.eta,
         "site_crimped_radius": case.crimped_radius,
         "wall_friction": case.wall.friction,
     }

@@ -37,9 +37,9 @@ REACH = 2.0
 def bezier_predictors(case: Case) -> Array:
     """The paper's μ_B (6,), named by ``BEZIER``."""
     centre, radius = _sac(case)
-    _, y, z = case.vessel.P1
+    _, y, z = case.tube.P1
     diameter = 2.0 * case.vessel_radius
-    return np.array([y, z, diameter, 2.0 * radius, centre[1], case.site.eta])
+    return np.array([y, z, diameter, 2.0 * radius, centre[1], case.eta])
 
 
 def centreline_predictors(case: Case, points: int) -> Array:
@@ -68,7 +68,7 @@ def site_predictors(case: Case, placed: PlacedBraid) -> Array:
     last's less the first's.
     """
     centre, radius = _sac(case)
-    line = case.centreline
+    line = case.bezier
     away, below = line.closest(centre)
     chord = line.P2 - line.P0
     chord = chord / np.linalg.norm(chord)
@@ -125,6 +125,4 @@ def _turns(below: Array, placed: PlacedBraid, middle: float) -> Array:
 
 def _sac(case: Case) -> tuple[Array, float]:
     """Centre (3,) and radius of the sac, mm."""
-    if case.aneurysm is None or case.aneurysm_centre is None:
-        raise InputError("aneurysm is missing; the surrogate needs one")
-    return np.asarray(case.aneurysm_centre), 0.5 * case.aneurysm.diameter
+    return np.asarray(case.aneurysm_centre), 0.5 * case.sac.diameter

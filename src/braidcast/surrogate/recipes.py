@@ -79,8 +79,8 @@ def seen_from_the_other_end(cases: Sequence[Case]) -> Mirror | None:
 
 
 def _is_symmetric(case: Case) -> bool:
-    chord = case.centreline.P2 - case.centreline.P0
-    x = [point[0] for point in (case.vessel.P0, case.vessel.P1, case.vessel.P2)]
+    chord = case.bezier.P2 - case.bezier.P0
+    x = [point[0] for point in (case.tube.P0, case.tube.P1, case.tube.P2)]
     return bool(np.ptp(x) == 0.0 and chord[1] == 0.0 and chord[2] > 0.0)
 
 

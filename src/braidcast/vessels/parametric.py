@@ -82,6 +82,10 @@ class Sphere:
         object.__setattr__(self, "centre", centre)
         _require_positive("radius", self.radius)
 
+    def depth(self, points: ArrayLike) -> NDArray[np.float64]:
+        """How deep points (n, 3) lie in it, (n,) mm, negative outside."""
+        return self.radius - np.linalg.norm(as_rows(points) - self.centre, axis=1)
+
 
 @dataclass(frozen=True, eq=False)
 class SaccularVessel(SignedDistance):
@@ -126,6 +130,10 @@ class SaccularVessel(SignedDistance):
     def centreline(self) -> QuadraticBezier:
         """Centreline of the parent vessel."""
         return self.tube.centreline
+
+    def parent_distance(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Signed distance (n,) mm of points (n, 3) to the wall of the parent vessel alone."""
+        return self.tube.distance(points)
 
     @cached_property
     def packed(self) -> NDArray[np.float64]:

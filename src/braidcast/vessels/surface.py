@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import manifold3d
 import numpy as np
@@ -18,6 +19,9 @@ from braidcast.atomic import write_atomically
 from braidcast.errors import InputError
 from braidcast.vessels.parametric import SaccularVessel, Tube
 
+if TYPE_CHECKING:
+    from braidcast.vessels.surface_vessel import SurfaceVessel
+
 Triangles = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 _STL_TRIANGLE = np.dtype(
@@ -25,13 +29,17 @@ _STL_TRIANGLE = np.dtype(
 )
 
 
-def vessel_surface(vessel: SaccularVessel, facets: int = 120) -> Triangles:
+def vessel_surface(vessel: SaccularVessel | SurfaceVessel, facets: int = 120) -> Triangles:
     """Watertight surface of tube, from P0 to P2 and closed there, and aneurysm.
+
+    Of a vessel that came from a surface that surface, as it was repaired, open at its ends.
 
     Returns vertices (n, 3) mm and triangles (m, 3), anticlockwise seen from outside. ``facets``
     go around the tube; they make it too narrow by up to R (1 − cos π/facets), 0.7 µm for
     R = 2 mm and 120 facets. ``InputError`` for fewer than 100.
     """
+    if not isinstance(vessel, SaccularVessel):
+        return vessel.surface.vertices, vessel.surface.triangles
     if facets < 100:
         raise InputError(f"facets = {facets} must be 100 or more, or the tube is too narrow")
     body = _solid(*_tube_surface(vessel.tube, facets))
