@@ -140,7 +140,9 @@ class Case(Table):
 
     @cached_property
     def surface_geometry(self) -> SurfaceVessel:
-        """The lumen within the surface of ``[vessel]``, which must be given by one."""
+        """The lumen within the surface of ``[vessel]``; ``InputError`` if there is none."""
+        if not isinstance(self.vessel, VesselFile):
+            raise InputError("vessel.surface is missing, must be the name of a surface's file")
         return self._loaded().with_aneurysm(self._region())
 
     @cached_property

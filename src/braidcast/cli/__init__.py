@@ -16,6 +16,7 @@ from braidcast.cli.predict import predict
 from braidcast.cli.simulate import simulate
 from braidcast.cli.study import study
 from braidcast.cli.train import card, evaluate, train
+from braidcast.cli.vessel import vessel
 
 app = typer.Typer(
     name="braidcast",
@@ -52,6 +53,7 @@ def _options(
 
 
 app.command(epilog="Example:  braidcast simulate examples/success.toml -o demo")(simulate)
+app.command(epilog="Example:  braidcast vessel artery.stl -o artery")(vessel)
 app.command(epilog="Example:  braidcast predict examples/success.toml -o predicted")(predict)
 app.command(epilog="Example:  braidcast train sixty -o sixty.npz")(train)
 app.command(epilog="Example:  braidcast evaluate sixty.npz sixty -o tested")(evaluate)

@@ -34,6 +34,8 @@ def simulate(
 ) -> None:
     """Deploy the device of a case by finite elements.
 
+    The vessel is one of the paper's, or the surface that the case names.
+
     Writes deployed.vtp (wires), vessel.stl, deployed.png and summary.json.
 
     Exit codes: 0 done; 1 the results could not be written; 2 bad input; 3 not converged (the
@@ -44,7 +46,8 @@ def simulate(
         from braidcast.deployment.output import write_deployment
         from braidcast.results_folder import check_folder
 
-        given = Case.from_toml(case)
+        with bars("surface", delay=1.0) as progress:
+            given = Case.from_toml(case, progress)
         folder = f"{case.stem}_deployed" if output is None else output
         check_folder(folder)
 

@@ -17,9 +17,11 @@ from braidcast.deployment.release import USUAL_SHIFT, ReleaseOptions, release, w
 from braidcast.deployment.result import Deployment
 from braidcast.deployment.shape import braid_length, ring_centres, wire_distance
 from braidcast.devices import Braid
+from braidcast.errors import InputError
 from braidcast.mechanics import Equilibrium, Joints, NewtonOptions, Problem, State
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import System
+from braidcast.vessels.distance_grid import OutsideGrid
 
 STAGES = ("crimp", "position", "release")
 
@@ -39,7 +41,8 @@ def simulate(
     """Finite element deployment of a case (paper, section 2.1.3).
 
     A simulation that finds no equilibrium returns its last state with ``converged`` False and the
-    reason. ``keep_frames`` keeps the crimped, positioned and all intermediate released shapes;
+    reason; ``InputError`` if the stent leaves a vessel from a surface by one of its ends.
+    ``keep_frames`` keeps the crimped, positioned and all intermediate released shapes;
     ``cache`` is the folder that keeps crimped devices, by default the user's.
 
     One BLAS thread is used: the blocks are small, and the answer is the same on any machine size.
@@ -64,9 +67,12 @@ def _simulate(
         (wall(braid, case.vessel_geometry, case.wall.friction),)
     )
     frames = [("free", np.array(braid.positions))]
-    system, last, iterations = _stages(
-        case, system, options, progress or _no_progress, cache, frames
-    )
+    try:
+        system, last, iterations = _stages(
+            case, system, options, progress or _no_progress, cache, frames
+        )
+    except OutsideGrid as error:
+        raise InputError(f"the stent leaves the vessel, must stay in it: {error}") from None
     reached = dict(frames)
     under_way = next((stage for stage in STAGES if stage not in reached), STAGES[-1])
     frames.append((under_way, last.state.positions))

@@ -62,27 +62,27 @@ class ClosedSac:
     """The inside of a closed surface, by its signed distance."""
 
     distance: MeshDistance
+    corners: Array
+    """Vertices (n, 3) of the surface, mm."""
 
     @classmethod
     def read(cls, path: str, units: str = "mm") -> ClosedSac:
         """The region inside the surface at ``path``; ``InputError`` if it is none, or open."""
-        surface = read_surface(path, units)
+        surface = read_surface(path, units, closed=True)
         if surface.openings:
             place = ", ".join(f"{x:.2f}" for x in surface.openings[0].centre)
             raise InputError(
                 f"surface = {path} is open at ({place}) mm, must be closed all around the sac"
             )
-        return cls(MeshDistance(surface))
+        return cls(MeshDistance(surface), surface.vertices)
 
     @cached_property
     def centre(self) -> Array:
-        corners = self.distance.surface.vertices
-        return 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        return 0.5 * (self.corners.min(axis=0) + self.corners.max(axis=0))
 
     @cached_property
     def radius(self) -> float:
-        away = np.linalg.norm(self.distance.surface.vertices - self.centre, axis=1)
-        return float(away.max())
+        return float(np.linalg.norm(self.corners - self.centre, axis=1).max())
 
     def depth(self, points: ArrayLike) -> Array:
         return -self.distance.distance(as_rows(points))

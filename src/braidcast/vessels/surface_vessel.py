@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline
 
 from braidcast.errors import InputError
 from braidcast.vessels.centreline import as_rows
@@ -143,13 +144,27 @@ def _arrays(vessel: SurfaceVessel) -> dict[str, NDArray[Any]]:
         "rim_sizes": np.array([len(o.rim) for o in surface.openings], dtype=np.int64),
         "remarks": np.array([*vessel.remarks, ""]),
         "centreline_found": np.array(vessel.centreline_found),
-        **{f"line_{name}": values for name, values in vessel.centreline.arrays().items()},
+        **_curve_arrays("line", vessel.centreline.curve),
+        **_curve_arrays("radius", vessel.centreline.radius_curve),
+        "radius_range": np.array(vessel.centreline.radius_range),
         **{f"grid_{name}": values for name, values in vessel.grid.arrays().items()},
+    }
+
+
+def _curve_arrays(name: str, curve: BSpline | None) -> dict[str, NDArray[Any]]:
+    assert curve is not None
+    return {
+        f"{name}_knots": curve.t,
+        f"{name}_shares": curve.c,
+        f"{name}_degree": np.array(curve.k),
     }
 
 
 def _restored(name: str, kept: Mapping[str, NDArray[Any]]) -> SurfaceVessel | None:
     """The vessel of these arrays; None if they are not all there."""
+
+    def curve(name: str) -> BSpline:
+        return BSpline(kept[f"{name}_knots"], kept[f"{name}_shares"], int(kept[f"{name}_degree"]))
 
     def part(prefix: str) -> dict[str, NDArray[Any]]:
         return {k.removeprefix(prefix): v for k, v in kept.items() if k.startswith(prefix)}
@@ -164,7 +179,7 @@ def _restored(name: str, kept: Mapping[str, NDArray[Any]]) -> SurfaceVessel | No
         return SurfaceVessel(
             name,
             LumenSurface(kept["vertices"], kept["triangles"], openings),
-            Polyline.from_arrays(part("line_")),
+            Polyline(curve("line"), curve("radius"), tuple(kept["radius_range"].tolist())),
             DistanceGrid.from_arrays(part("grid_")),
             bool(kept["centreline_found"]),
             tuple(str(remark) for remark in kept["remarks"][:-1]),
@@ -181,17 +196,21 @@ def _made(source: SurfaceSource, report: Progress) -> SurfaceVessel:
     name = Path(source.surface).name
     report("surface", 0.0)
     surface = read_surface(source.surface, source.units)
-    continued = extended(surface, EXTENSION)
-    wall = MeshDistance(continued)
+    wall = MeshDistance(extended(surface, EXTENSION))
     report("surface", 1.0)
     report("centreline", 0.0)
     line, remarks = _centreline(source, surface, wall)
     report("centreline", 1.0)
     spacing = source.spacing or usual_spacing(surface, source.wire_radius)
-    grid = DistanceGrid.of(continued, spacing, partial(report, "distance"))
+    grid = DistanceGrid.of(surface, spacing, partial(report, "distance"))
     report("distance", 1.0)
     return SurfaceVessel(
-        name, surface, line, grid, source.centreline is None, surface.remarks + tuple(remarks)
+        name,
+        surface,
+        line,
+        grid,
+        source.centreline is None,
+        (*surface.remarks, *grid.remarks, *remarks),
     )
 
 
