@@ -12,7 +12,7 @@ from braidcast.errors import InputError
 from braidcast.vessels.extension import extended
 from braidcast.vessels.lumen_surface import LumenSurface
 from braidcast.vessels.mesh_distance import MeshDistance
-from problems.surfaces import closed, cylinder, neck_depths
+from problems.surfaces import cylinder, neck_depths
 
 RNG = np.random.default_rng(4)
 
@@ -72,7 +72,6 @@ def test_beyond_an_open_end_the_wall_goes_on():
     points = RNG.uniform([-1.5, -1.5, -7], [1.5, 1.5, 13], (5000, 3))
     distance, overrun = MeshDistance(surface).distance_and_overrun(points)
     assert_allclose(distance, np.hypot(*points[:, :2].T) - 1, atol=5e-5)
-    assert_allclose(overrun, np.abs(points[:, 2] - 3) - 8 * np.ones(5000), atol=8)
     assert_allclose(overrun, np.maximum(np.abs(points[:, 2] - 3) - 8, 0), atol=1e-12)
 
 
@@ -82,18 +81,14 @@ def test_depth_in_the_neck():
 
 
 def test_chunks_make_no_difference(monkeypatch):
-    distance = MeshDistance(closed_ball())
+    distance = MeshDistance(cube())
     points = RNG.uniform(-1.5, 1.5, (1000, 3))
     whole = distance.distance(points)
     monkeypatch.setattr("braidcast.vessels.mesh_distance._CHUNK", 77)
     assert (distance.distance(points) == whole).all()
     assert distance.distance(np.empty((0, 3))).shape == (0,)
-
-
-def closed_ball():
-    import manifold3d
-
-    return closed(manifold3d.Manifold.sphere(1.0, 32))
+    with pytest.raises(ValueError, match="finite"):
+        distance.distance([np.nan, 0, 0])
 
 
 def test_without_fcpw_one_sentence(monkeypatch):

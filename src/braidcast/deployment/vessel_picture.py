@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from io import BytesIO
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -14,7 +15,7 @@ from braidcast.deployment.vessel_inspection import VesselInspection
 
 BLUE, VERMILLION, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
 
-_SETTINGS = {
+_SETTINGS: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.titlelocation": "left",
     "axes.titlesize": 9.5,

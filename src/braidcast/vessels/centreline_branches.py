@@ -15,7 +15,8 @@ from scipy.spatial import cKDTree
 Array = NDArray[np.float64]
 
 _GAP = 0.5
-"""A line's end is joined to another line this near, mm, if the lines' spacing is no wider."""
+"""A line's end is joined to another line this near, mm, or one and a half times the usual spacing
+of the points."""
 
 
 def way_through(lines: list[Array], ends: Array) -> tuple[NDArray[np.int64], Array] | None:
@@ -51,7 +52,7 @@ def _joints(points: Array, start: NDArray[np.int64], tree: cKDTree) -> NDArray[n
     same = tree.query_pairs(1e-6, output_type="ndarray")
     ends = np.concatenate([start[:-1], start[1:] - 1])
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)[line[1:] == line[:-1]]
-    reach = max(_GAP, float(np.median(steps)) if len(steps) else 0.0)
+    reach = max(_GAP, 1.5 * float(np.median(steps)) if len(steps) else 0.0)
     joints = [same.reshape(-1, 2)]
     for end in ends:
         near = np.array(tree.query_ball_point(points[end], reach), dtype=np.int64)

@@ -112,8 +112,9 @@ def _vtk_lines(path: Path, where: str) -> tuple[list[Line], list[str]]:
 
 
 def _slicer_lines(path: Path, where: str) -> tuple[list[Line], list[str]]:
+    text = _text(path, where)
     try:
-        markups = json.loads(_text(path, where))["markups"]
+        markups = json.loads(text)["markups"]
         curves = [m for m in markups if m.get("type", "Curve") in ("Curve", "ClosedCurve", "Line")]
         lines = [line for m in curves if (line := _slicer_line(m)) is not None]
     except json.JSONDecodeError as error:

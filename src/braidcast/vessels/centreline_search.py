@@ -25,14 +25,14 @@ _REACH = 2.5
 _STAGES = ((0.5, 1.2, 4.0), (0.25, 1.0, 3.0), (0.12, 0.8, 2.0), (0.06, 0.65, 1.0))
 """Tolerance of the wall's misses and smoothing lengths of centre and radius: a stiff tube that
 bridges an aneurysm settles before a finer one follows the wall."""
-_STIFFNESS = (0.35, 0.35)
+_STIFFNESS = (0.4, 0.35)
 """The smoothing lengths at last."""
 _TOLERANCES = (0.02, 0.2)
 """Least and largest tolerance at last: twice the scatter of the wall, which need not be round."""
 _BETWEEN = 0.12
 """Smoothing length of the line through the sections' centres, already smooth."""
 _LONGEST_HIDDEN = 4.0
-_LARGEST_DOUBT = 0.25
+_LARGEST_DOUBT = 0.18
 """Of the centre's place: what another measure of smoothness makes of it, usually 5 to 10 times
 what is in truth missed."""
 _LEAST_DEPTH = 0.6

@@ -24,7 +24,7 @@ FINEST, USUAL, COARSEST = 0.03, 0.1, 0.15
 # A sharp edge is rounded by some 0.2 h, which stays below the radius of a wire.
 _WIRES = 4.0
 # Places of the wall at which the lumen's width is measured.
-_PLACES = 2000
+_PLACES = 500
 
 
 def usual_spacing(surface: LumenSurface, wire_radius: float) -> float:

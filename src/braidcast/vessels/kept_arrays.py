@@ -27,8 +27,8 @@ def read_kept(beside: Path, name: str) -> dict[str, NDArray[Any]] | None:
 
 def keep(beside: Path, name: str, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write the arrays whole or not at all; where neither folder takes them, they are not kept."""
-    content = BytesIO()
-    np.savez(content, **arrays)
+    content, named = BytesIO(), dict[str, Any](arrays)
+    np.savez(content, **named)
     for folder in (beside.parent, cache_folder()):
         # What cannot be kept costs time, not the result.
         with suppress(OSError):

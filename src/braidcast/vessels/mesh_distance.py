@@ -55,9 +55,12 @@ class MeshDistance:
     def distance_and_overrun(self, points: ArrayLike) -> tuple[Array, Array]:
         """Signed distance (n,) and how far beyond an open end (n,) each point is, mm.
 
-        The overrun is 0 wherever the nearest wall is not the rim of an opening.
+        The overrun is 0 wherever the nearest wall is not the rim of an opening. ``ValueError`` for
+        points that are not finite.
         """
         points = as_rows(points)
+        if not np.isfinite(points).all():
+            raise ValueError("points must be finite")
         distance, overrun = np.empty(len(points)), np.empty(len(points))
         for first in range(0, len(points), _CHUNK):
             part = slice(first, first + _CHUNK)

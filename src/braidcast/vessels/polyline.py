@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
@@ -71,6 +72,24 @@ class Polyline:
         )
         line._refuse_sharp_turns(smoothing)
         return line
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Everything as arrays, for a file; ``from_arrays`` is the way back."""
+        arrays = {"knots": self.curve.t, "places": self.curve.c}
+        if self.radius_curve is not None:
+            arrays["radius_knots"], arrays["radii"] = self.radius_curve.t, self.radius_curve.c
+            arrays["radius_range"] = np.array(self.radius_range)
+        return arrays
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray]) -> Polyline:
+        """The centreline whose ``arrays`` these are; ``KeyError`` if one is missing."""
+        curve = BSpline(arrays["knots"], arrays["places"], DEGREE)
+        if "radii" not in arrays:
+            return cls(curve)
+        low, high = arrays["radius_range"]
+        radii = BSpline(arrays["radius_knots"], arrays["radii"], DEGREE)
+        return cls(curve, radii, (float(low), float(high)))
 
     @cached_property
     def _motion(self) -> PPoly:

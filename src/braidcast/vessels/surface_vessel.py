@@ -21,8 +21,9 @@ from braidcast.errors import InputError
 from braidcast.vessels.centreline import as_rows
 from braidcast.vessels.centreline_file import flipped_lps_ras, read_centreline
 from braidcast.vessels.centreline_search import find_centreline
-from braidcast.vessels.distance_grid import EXTENSION, DistanceGrid, usual_spacing
+from braidcast.vessels.distance_grid import EXTENSION, DistanceGrid
 from braidcast.vessels.extension import extended
+from braidcast.vessels.grid_spacing import usual_spacing
 from braidcast.vessels.kept_arrays import keep, read_kept
 from braidcast.vessels.lumen_surface import LumenSurface, Opening
 from braidcast.vessels.mesh_distance import MeshDistance

@@ -1,0 +1,190 @@
+"""Centrelines read back from files as VMTK, 3D Slicer and tables hold them."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from braidcast.errors import InputError
+from braidcast.vessels.centreline_branches import way_through
+from braidcast.vessels.centreline_file import flipped_lps_ras, read_centreline
+
+S = np.linspace(0.0, 30.0, 61)
+MAIN = np.stack([0.0 * S, 4.0 * np.sin(S / 10.0), S], axis=1)
+SIDE = MAIN[30] + np.stack([0.5, 0.2, 0.3] * np.arange(25)[:, None], axis=0)
+RADII = 2.0 - 0.01 * S
+
+
+def write_lines(path, lines, name="MaximumInscribedSphereRadius"):
+    pyvista = pytest.importorskip("pyvista")
+    cells, start = [], 0
+    for points, _ in lines:
+        cells += [len(points), *range(start, start + len(points))]
+        start += len(points)
+    mesh = pyvista.PolyData(np.concatenate([points for points, _ in lines]), lines=cells)
+    mesh.point_data[name] = np.concatenate([radii for _, radii in lines])
+    mesh.save(path)
+
+
+def write_markups(path, points, **more):
+    controls = [{"position": list(p), "positionStatus": "defined"} for p in points]
+    markup = {"type": "Curve", "coordinateSystem": "LPS", "controlPoints": controls, **more}
+    path.write_text(json.dumps({"markups": [markup]}))
+
+
+@pytest.mark.parametrize(
+    ("ending", "name"), [(".vtp", "MaximumInscribedSphereRadius"), (".vtk", "Radius")]
+)
+def test_vtk_line(tmp_path, ending, name):
+    path = tmp_path / f"line{ending}"
+    write_lines(path, [(MAIN, RADII)], name)
+    found = read_centreline(path)
+    assert_allclose(found.points, MAIN, rtol=0, atol=1e-5)
+    assert_allclose(found.radii, RADII, rtol=1e-5)
+
+
+def test_markups_of_3d_slicer(tmp_path):
+    path = tmp_path / "line.mrk.json"
+    write_markups(path, MAIN)
+    found = read_centreline(path)
+    assert_array_equal(found.points, MAIN)
+    assert found.radii is None
+    measurements = [{"name": "Radius", "controlPointValues": RADII.tolist()}]
+    write_markups(path, MAIN, measurements=measurements)
+    assert_array_equal(read_centreline(path).radii, RADII)
+
+
+def test_markups_without_a_place_are_passed_over(tmp_path):
+    path = tmp_path / "line.json"
+    write_markups(path, MAIN)
+    content = json.loads(path.read_text())
+    content["markups"][0]["controlPoints"][7]["positionStatus"] = "undefined"
+    path.write_text(json.dumps(content))
+    assert_array_equal(read_centreline(path).points, np.delete(MAIN, 7, axis=0))
+
+
+@pytest.mark.parametrize("between", [",", ";", " ", "\t", ", "])
+@pytest.mark.parametrize(
+    "header", [None, "x y z radius", "X Y Z Radius", "x y z MaximumInscribedSphereRadius"]
+)
+def test_table(tmp_path, between, header):
+    path = tmp_path / "line.csv"
+    rows = [between.join(map(repr, map(float, row))) for row in np.column_stack([MAIN, RADII])]
+    if header is not None:
+        rows.insert(0, header.replace(" ", between))
+    path.write_text("\n".join(rows) + "\n")
+    found = read_centreline(path)
+    assert_array_equal(found.points, MAIN)
+    assert_array_equal(found.radii, RADII)
+
+
+def test_table_with_its_columns_in_another_order(tmp_path):
+    path = tmp_path / "line.csv"
+    rows = [f"{i},{z},{y},{x}" for i, (x, y, z) in enumerate(MAIN.tolist())]
+    path.write_text("\n".join(["id,z,y,x", *rows]))
+    found = read_centreline(path)
+    assert_array_equal(found.points, MAIN)
+    assert found.radii is None
+
+
+TREES = {
+    # VMTK: each line from the inlet; segments that share their end points; segments with a gap.
+    "from one inlet": [MAIN, np.concatenate([MAIN[:31], SIDE[1:]])],
+    "segments": [MAIN[:31], MAIN[30:], SIDE],
+    "segments apart": [MAIN[:31], MAIN[31:], SIDE[1:]],
+    "branch from the middle": [MAIN, SIDE],
+}
+
+
+@pytest.mark.parametrize("lines", TREES.values(), ids=TREES)
+def test_ends_choose_the_way_through_branches(lines):
+    points = np.concatenate(lines)
+    for ends, expected in (
+        ((MAIN[0], MAIN[-1]), MAIN),
+        ((MAIN[-1], MAIN[0]), MAIN[::-1]),
+        ((MAIN[0], SIDE[-1]), np.concatenate([MAIN[:31], SIDE[1:]])),
+        ((SIDE[-1], MAIN[-1]), np.concatenate([SIDE[:0:-1], MAIN[30:]])),
+    ):
+        way, away = way_through(lines, np.array(ends))
+        found = points[way]
+        distance = np.linalg.norm(found[:, None] - expected, axis=2)
+        assert_allclose(away, 0.0, rtol=0, atol=1e-12)
+        assert distance.min(axis=1).max() < 0.65
+        assert distance.min(axis=0).max() < 0.65
+        assert_array_equal(found[[0, -1]], expected[[0, -1]])
+        assert np.linalg.norm(np.diff(found, axis=0), axis=1).max() < 1.0
+
+
+def test_a_file_with_branches_needs_ends(tmp_path):
+    path = tmp_path / "tree.vtp"
+    write_lines(path, [(MAIN[:31], RADII[:31]), (MAIN[30:], RADII[30:]), (SIDE, RADII[30:55])])
+    with pytest.raises(InputError, match=r"^centreline = .*tree.vtp holds 3 .* by `vessel.ends`"):
+        read_centreline(path)
+    found = read_centreline(path, [MAIN[0], MAIN[-1]])
+    assert_allclose(found.points[:31], MAIN[:31], rtol=0, atol=1e-5)
+    assert_allclose(found.radii[:31], RADII[:31], rtol=1e-6)
+    assert_allclose(found.points[-30:], MAIN[-30:], rtol=0, atol=1e-5)
+
+
+def test_ends_cut_and_turn_a_single_line(tmp_path):
+    path = tmp_path / "line.csv"
+    np.savetxt(path, np.column_stack([MAIN, RADII]), delimiter=",")
+    found = read_centreline(path, [MAIN[50] + [1, 0, 0], MAIN[10] + [0.1, 0, 0]])
+    assert_allclose(found.points, MAIN[50:9:-1])
+    assert_allclose(found.radii, RADII[50:9:-1])
+
+
+def test_ends_that_no_line_joins_or_meets(tmp_path):
+    path = tmp_path / "two.vtp"
+    other = MAIN + [20.0, 0.0, 0.0]
+    write_lines(path, [(MAIN, RADII), (other, RADII)])
+    with pytest.raises(InputError, match="does not join the ends"):
+        read_centreline(path, [MAIN[0], other[-1]])
+    with pytest.raises(InputError, match=r"is 10 mm from the end .* at most 5 mm"):
+        read_centreline(path, [MAIN[0], MAIN[-1] + [0, 0, 10]])
+
+
+def test_the_other_axes_turn_x_and_y():
+    assert_array_equal(flipped_lps_ras([[1.0, 2.0, 3.0]]), [[-1.0, -2.0, 3.0]])
+    assert_array_equal(flipped_lps_ras(flipped_lps_ras(MAIN)), MAIN)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("line.stl", "", r"must be a file .vtp, .vtk, .json or .csv"),
+        ("line.csv", "", "is empty"),
+        ("line.csv", "x,y,z\n", "holds no points"),
+        ("line.csv", "x,y,r\n1,2,3\n", "must have x, y, z"),
+        ("line.csv", "x,y,z\n1,2,3\n1,zwei,3\n", "line 3 must hold 3 numbers, not '1 zwei 3'"),
+        ("line.csv", "1,2,3\n1,2\n", "line 2 must hold 3 numbers"),
+        ("line.csv", "1,2,3\n1,2,nan\n1,2,5\n1,2,6\n", "point 2"),
+        ("line.csv", "1,2,3,1\n1,2,4,1\n1,2,5,-1\n1,2,6,1\n", "radius -1.0 of point 3"),
+        ("line.csv", "1,2,3\n1,2,4\n1,2,4\n1,2,5\n", "3 different points"),
+        ("line.json", "{", "is not JSON"),
+        ("line.json", "[1, 2]", "not a markups file"),
+        ("line.json", '{"markups": [{"type": "Curve"}]}', "not a markups file"),
+        ("line.json", '{"markups": []}', "holds no curve"),
+        ("line.json", '{"markups": [{"type": "Fiducial", "controlPoints": []}]}', "no curve"),
+    ],
+)
+def test_what_is_no_centreline_is_refused(tmp_path, name, text, message):
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(InputError, match=message) as raised:
+        read_centreline(path)
+    assert str(raised.value).startswith(f"centreline = {path} ")
+
+
+@pytest.mark.parametrize("name", ["none.csv", "none.json", "none.vtp"])
+def test_a_missing_file_is_refused(tmp_path, name):
+    with pytest.raises(InputError, match=r"^centreline = .*none.* cannot be read: No such file"):
+        read_centreline(tmp_path / name)
+
+
+def test_a_surface_is_no_centreline(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    pyvista.Sphere().save(tmp_path / "ball.vtp")
+    with pytest.raises(InputError, match="holds no line"):
+        read_centreline(tmp_path / "ball.vtp")
