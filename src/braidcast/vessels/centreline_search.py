@@ -70,6 +70,7 @@ def find_centreline(
     s = _stations(line, ends, typical)
     r = np.interp(s, [0.0, line.length], radii)
 
+    # The tolerance at last is not known before the scatter of the wall is.
     least = _TOLERANCES[0]
     for number in range(len(_STAGES) + _MOST_ROUNDS):
         last = number >= len(_STAGES)
@@ -84,6 +85,7 @@ def find_centreline(
         least = float(np.clip(2.0 * _scatter(sections, centres, radii), *_TOLERANCES))
         s = _stations(line, ends, typical)
         r = line.lumen_radius(s)
+    # Where wall is missing another measure of smoothness leads elsewhere.
     other = fitted(sections, *fit, order=2)[0]
     doubt = np.maximum(np.linalg.norm(other - centres, axis=1), moved)
     _refuse_doubtful(distance, sections, centres, radii, share, doubt / radii)
@@ -92,7 +94,10 @@ def find_centreline(
 
 
 def _stations(line: Polyline, ends: Array, typical: float) -> Array:
-    """Arc lengths from the nearest place of ends[0] to that of ends[1], by a little beyond them."""
+    """Arc lengths from the place nearest to ends[0] to that nearest to ends[1], evenly spaced.
+
+    They may lie beyond the line, by a diameter at most.
+    """
     half, beyond = 0.5 * line.length, 2.0 * typical
     limits = []
     for end, way in zip(
@@ -128,6 +133,7 @@ def _scatter(sections: Sections, centres: Array, r: Array) -> float:
 def _refuse_doubtful(
     distance: Distance, sections: Sections, centres: Array, r: Array, share: Array, doubt: Array
 ) -> None:
+    """``InputError`` if too much wall is hidden, ``doubt`` (m,) is large or a wall is too near."""
     hidden = share < LEAST_SEEN
     step = sections.u[1] - sections.u[0]
     edges = np.flatnonzero(np.diff(np.concatenate([[0], hidden.astype(int), [0]])))

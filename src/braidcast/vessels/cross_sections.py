@@ -14,7 +14,7 @@ RAYS = 32
 
 def wall_points(
     distance: Distance, centres: Array, tangents: Array, reach: Array
-) -> tuple[Array, Array]:
+) -> tuple[Array, NDArray[np.bool_]]:
     """Where rays from centres (m, 3) mm, square to tangents (m, 3), first meet the wall.
 
     Returns the wall's places (m, RAYS, 3) mm, within about 1e-4 of the reach, and whether there

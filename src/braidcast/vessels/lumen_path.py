@@ -23,7 +23,7 @@ _COARSE, _FINE, _FINEST = 2.0, 0.25, 0.125
 """Spacings of the grid, mm: at first, where an end must be in it, and at last."""
 _CELLS_ACROSS = 6.0
 """Cells across the vessel at its narrower end."""
-_FIRST_NODES, _MOST_NODES = 20_000, 150_000
+_FIRST_NODES, _MOST_NODES = 20_000, 60_000
 
 _CHILDREN = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 _NEIGHBOURS = np.array(

@@ -20,6 +20,7 @@ from braidcast.vessels.smooth_spline import basis, even_knots, roughness, shares
 Array = NDArray[np.float64]
 
 _REWEIGHTINGS = 6
+_HOLD = 1e-6
 _ROUND = 0.1
 """A section with walls all around, as far from its centre to this share, is the vessel's own even
 if the tube's radius is another: it is at a stenosis, or beside one."""
@@ -87,6 +88,9 @@ def fitted(
         # Along the vessel a centre has no reason to move.
         matrix[:, :3, :3] += pin
         right[:, :3] += np.einsum("mij,mj->mi", pin, centres)
+        # Where no wall is seen at all the radius stays.
+        matrix[:, 3, 3] += _HOLD
+        right[:, 3] += _HOLD * radii
         blocks = block_array(
             [
                 [rows.T @ diags_array(share_of_length * matrix[:, i, j]) @ rows for j in range(4)]
