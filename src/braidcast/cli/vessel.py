@@ -120,7 +120,7 @@ def _rows(seen: VesselInspection) -> list[tuple[str, str]]:
         ),
         (
             "signed distance",
-            f"every {grid.spacing:.3g} mm, {grid.coefficients.size / 1e6:.1f} million points, "
+            f"every {grid.spacing:.3g} mm, {grid.bricks.size / 1e6:.1f} million points, "
             f"within {1e3 * seen.grid_error:.2g} µm of the surface's near the wall",
         ),
     ]

@@ -62,7 +62,7 @@ def inspection_summary(seen: VesselInspection) -> dict[str, Any]:
         "crimped_length_mm": seen.crimped_length,
         "proximal_end_windows_mm": [list(window) for window in seen.windows],
         "distance_spacing_mm": vessel.grid.spacing,
-        "distance_points": vessel.grid.coefficients.size,
+        "distance_points": vessel.grid.bricks.size,
         "distance_error_mm": seen.grid_error,
         "version": __version__,
     }

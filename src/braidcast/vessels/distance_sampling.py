@@ -2,16 +2,16 @@
 
 The grid is divided into blocks of 8³ nodes and those into cells of 2³. The distance changes by no
 more than the way walked, so that the exact distance at the centre of a block or cell says whether
-any of its nodes can be within ``reach`` of the wall, or ``DEPTH`` on the side of the lumen; then
-the cell's nodes are sampled. Others in and about the lumen are interpolated between the centres of
-the cells, and those farther outside between the centres of the blocks, held to the bounds that
-their own centre gives. Lengths in mm.
+any of its nodes can be within ``reach`` of the wall; then the cell's nodes are sampled. Others of
+such a block are interpolated between the centres of the cells, and all farther ones between the
+centres of the blocks, held to the bounds that their own centre gives. Lengths in mm.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -24,8 +24,6 @@ Array = NDArray[np.float64]
 
 BLOCK = 8
 CELL = 2
-DEPTH = 1.5
-"""To this depth in the lumen, mm, every node is sampled."""
 # From the centre of a block or cell to the farthest of its nodes, in spacings.
 _BLOCK_RADIUS = 0.5 * math.sqrt(3.0) * (BLOCK - 1)
 _CELL_RADIUS = 0.5 * math.sqrt(3.0) * (CELL - 1)
@@ -39,6 +37,15 @@ _BLOCKS_AT_A_TIME = 1000
 _compile = njit(cache=True, error_model="numpy")
 
 
+class Samples(NamedTuple):
+    """Distances at the nodes of the grid, at the centres of its blocks, and the blocks (n, 3) that
+    may have a node within reach of the wall."""
+
+    field: NDArray[np.float32]
+    centres: NDArray[np.float32]
+    near: NDArray[np.int64]
+
+
 def sample(
     distance: MeshDistance,
     origin: Array,
@@ -46,29 +53,30 @@ def sample(
     blocks: tuple[int, int, int],
     reach: float,
     progress: Callable[[float], None],
-) -> NDArray[np.float32]:
+) -> Samples:
     """Distances, mm, at the nodes of a grid of ``blocks`` of 8³ nodes.
 
-    They are exact from -``DEPTH`` to ``reach``. ``progress`` is called with the share done, 0 to 1.
+    Those up to ``reach`` are exact. ``progress`` is called with the share done, 0 to 1.
     """
     coarse = _centres(distance, origin, spacing, blocks)
     field = np.empty([BLOCK * count for count in blocks], dtype=np.float32)
     _interpolate(coarse, _catmull_rom(), spacing * _BLOCK_RADIUS, field)
     progress(0.1)
 
-    low, high = -DEPTH - spacing * _CELL_RADIUS, reach + spacing * _CELL_RADIUS
+    far = reach + spacing * _CELL_RADIUS
     halves = np.full([BLOCK // CELL * count for count in blocks], np.nan, dtype=np.float32)
-    near = np.argwhere(coarse[2:-2, 2:-2, 2:-2] <= reach + spacing * _BLOCK_RADIUS)
+    centres = coarse[2:-2, 2:-2, 2:-2]
+    near = np.argwhere(np.abs(centres) <= reach + spacing * _BLOCK_RADIUS)
     for first in range(0, len(near), _BLOCKS_AT_A_TIME):
         part = near[first : first + _BLOCKS_AT_A_TIME]
         cells = _parts(BLOCK * part, BLOCK, CELL)
         values = _values(distance, origin + spacing * (cells + 0.5 * (CELL - 1)))
         halves[tuple(cells.T // CELL)] = values
-        nodes = _parts(cells[(low <= values) & (values <= high)], CELL, 1)
+        nodes = _parts(cells[np.abs(values) <= far], CELL, 1)
         field[tuple(nodes.T)] = _values(distance, origin + spacing * nodes)
         progress(0.1 + 0.9 * min(1.0, (first + len(part)) / len(near)))
-    _refine(halves, low, high, spacing * _CELL_RADIUS, field)
-    return field
+    _refine(halves, far, spacing * _CELL_RADIUS, field)
+    return Samples(field, np.ascontiguousarray(centres, dtype=np.float32), near)
 
 
 def _centres(
@@ -152,12 +160,11 @@ def _interpolate(coarse: Array, weights: Array, radius: float, field: NDArray[np
 @_compile
 def _refine(
     halves: NDArray[np.float32],
-    low: float,
-    high: float,
+    far: float,
     radius: float,
     field: NDArray[np.float32],
 ) -> None:
-    """Interpolates between the exact values at the centres of cells, where below low or above high.
+    """Interpolates between the exact values at the centres of cells that are farther than ``far``.
 
     Where a cell about a node has no value, NaN, the node is held to the bounds of its own cell.
     """
@@ -165,7 +172,7 @@ def _refine(
         for b in range(1, halves.shape[1] - 1):
             for c in range(1, halves.shape[2] - 1):
                 centre = halves[a, b, c]
-                if not (centre < low or centre > high):
+                if not abs(centre) > far:
                     continue
                 for p in range(CELL):
                     for q in range(CELL):

@@ -1,4 +1,4 @@
-"""Compiled evaluation of a cubic B-spline on a cubic grid, and what fills such a grid.
+"""Compiled evaluation of a cubic B-spline on the bricks of a cubic grid.
 
     f(x) = Σ c_ijk β(u − i) β(v − j) β(w − k),   (u, v, w) = (x − origin)/h,   β the cubic B-spline
 
@@ -12,6 +12,16 @@ import math
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+Spline = tuple[
+    NDArray[np.float32],
+    NDArray[np.int32],
+    NDArray[np.float32],
+    NDArray[np.float64],
+    float,
+    NDArray[np.float64],
+]
+"""The first arguments of ``evaluate``."""
 
 _compile = njit(cache=True, error_model="numpy")
 
@@ -42,9 +52,10 @@ def _is_outside(
     y: float,
     z: float,
 ) -> bool:
-    """Whether the spline is not known at a place: off the grid or beyond an open end."""
+    """Whether the distance is not known at a place: off the grid or beyond an open end."""
+    a, b, c = 8.0 * shape[0] - 2.0, 8.0 * shape[1] - 2.0, 8.0 * shape[2] - 2.0
     # Written so that a coordinate that is not a number is outside.
-    if not (1.0 <= u < shape[0] - 2.0 and 1.0 <= v < shape[1] - 2.0 and 1.0 <= w < shape[2] - 2.0):
+    if not (1.0 <= u < a and 1.0 <= v < b and 1.0 <= w < c):
         return True
     for k in range(ends.shape[0]):
         dx, dy, dz = x - ends[k, 0], y - ends[k, 1], z - ends[k, 2]
@@ -56,8 +67,41 @@ def _is_outside(
 
 
 @_compile
+def _between_centres(
+    centres: NDArray[np.float32], u: float, v: float, w: float, gradient: NDArray[np.float64]
+) -> float:
+    """Value between the centres of the blocks, and gradient (3,) by spacings."""
+    i, s = _cell((u - 3.5) / 8.0, centres.shape[0])
+    j, t = _cell((v - 3.5) / 8.0, centres.shape[1])
+    k, r = _cell((w - 3.5) / 8.0, centres.shape[2])
+    value = 0.0
+    gradient[:] = 0.0
+    for p in range(2):
+        a, da = (s, 0.125) if p else (1.0 - s, -0.125)
+        for q in range(2):
+            b, db = (t, 0.125) if q else (1.0 - t, -0.125)
+            for o in range(2):
+                c, dc = (r, 0.125) if o else (1.0 - r, -0.125)
+                f = np.float64(centres[i + p, j + q, k + o])
+                value += a * b * c * f
+                gradient[0] += da * b * c * f
+                gradient[1] += a * db * c * f
+                gradient[2] += a * b * dc * f
+    return value
+
+
+@_compile
+def _cell(place: float, count: int) -> tuple[int, float]:
+    """The first of the two entries, of ``count``, that a place lies between, and its share."""
+    first = min(max(int(math.floor(place)), 0), count - 2)
+    return first, min(max(place - first, 0.0), 1.0)
+
+
+@_compile
 def evaluate(
-    coefficients: NDArray[np.float32],
+    bricks: NDArray[np.float32],
+    numbers: NDArray[np.int32],
+    centres: NDArray[np.float32],
     origin: NDArray[np.float64],
     spacing: float,
     ends: NDArray[np.float64],
@@ -68,6 +112,7 @@ def evaluate(
 ) -> int:
     """Fills value, gradient and Hessian at points (n, 3); the first place that is outside, or -1.
 
+    In blocks without a brick the value is interpolated linearly between the centres of the blocks.
     ``ends`` (k, 8): centre, unit normal, radius and length of the cylinders beyond the open ends,
     in which nothing is known.
     """
@@ -76,9 +121,18 @@ def evaluate(
     for n in range(points.shape[0]):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
         u, v, w = (x - origin[0]) * inverse, (y - origin[1]) * inverse, (z - origin[2]) * inverse
-        if _is_outside(coefficients.shape, ends, u, v, w, x, y, z):
+        if _is_outside(numbers.shape, ends, u, v, w, x, y, z):
             return n
-        i, j, k = int(u) - 1, int(v) - 1, int(w) - 1
+        i, j, k = int(u), int(v), int(w)
+        brick = numbers[i // 8, j // 8, k // 8]
+        if brick < 0:
+            values[n] = _between_centres(centres, u, v, w, gradients[n])
+            for axis in range(3):
+                gradients[n, axis] *= inverse
+                for other in range(3):
+                    hessians[n, axis, other] = 0.0
+            continue
+        i, j, k = i % 8, j % 8, k % 8
         _weights(u - math.floor(u), inverse, a)
         _weights(v - math.floor(v), inverse, b)
         _weights(w - math.floor(w), inverse, c)
@@ -89,7 +143,7 @@ def evaluate(
             for q in range(4):
                 e, ez, ezz = 0.0, 0.0, 0.0
                 for r in range(4):
-                    value = np.float64(coefficients[i + p, j + q, k + r])
+                    value = np.float64(bricks[brick, i + p, j + q, k + r])
                     e += c[0, r] * value
                     ez += c[1, r] * value
                     ezz += c[2, r] * value
@@ -115,36 +169,4 @@ def evaluate(
         hessians[n, 0, 1] = hessians[n, 1, 0] = xy
         hessians[n, 0, 2] = hessians[n, 2, 0] = xz
         hessians[n, 1, 2] = hessians[n, 2, 1] = yz
-    return -1
-
-
-@_compile
-def distance(
-    coefficients: NDArray[np.float32],
-    origin: NDArray[np.float64],
-    spacing: float,
-    ends: NDArray[np.float64],
-    points: NDArray[np.float64],
-    values: NDArray[np.float64],
-) -> int:
-    """Fills the value at points (n, 3); the first place that is outside, or -1."""
-    inverse = 1.0 / spacing
-    a, b, c = np.empty((3, 4)), np.empty((3, 4)), np.empty((3, 4))
-    for n in range(points.shape[0]):
-        x, y, z = points[n, 0], points[n, 1], points[n, 2]
-        u, v, w = (x - origin[0]) * inverse, (y - origin[1]) * inverse, (z - origin[2]) * inverse
-        if _is_outside(coefficients.shape, ends, u, v, w, x, y, z):
-            return n
-        i, j, k = int(u) - 1, int(v) - 1, int(w) - 1
-        _weights(u - math.floor(u), inverse, a)
-        _weights(v - math.floor(v), inverse, b)
-        _weights(w - math.floor(w), inverse, c)
-        f = 0.0
-        for p in range(4):
-            for q in range(4):
-                e = 0.0
-                for r in range(4):
-                    e += c[0, r] * np.float64(coefficients[i + p, j + q, k + r])
-                f += a[0, p] * b[0, q] * e
-        values[n] = f
     return -1
