@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy import ndimage
 
 from braidcast.errors import InputError
-from braidcast.vessels.distance_grid import DistanceGrid, OutsideGrid
+from braidcast.vessels.distance_grid import DistanceGrid, OutsideGrid, _bricks
 from braidcast.vessels.extension import extended
 from braidcast.vessels.grid_spacing import usual_spacing
 from braidcast.vessels.lumen_surface import LumenSurface
@@ -51,12 +51,17 @@ def test_spline_is_of_order_four_for_value_three_for_slope_two_for_curvature():
     def f(p):
         return np.sin(p @ [1.0, 0.7, -0.4]) + np.cos(p @ [0.3, -0.9, 0.8])
 
-    points = RNG.uniform(1.5, 2.5, (500, 3))
+    points = RNG.uniform(1.2, 2.2, (500, 3))
     errors = []
     for h in (0.2, 0.1):
-        nodes = np.moveaxis(np.indices([round(4 / h) + 1] * 3), 0, -1) * h
+        nodes = np.moveaxis(np.indices([round(3.2 / h)] * 3), 0, -1) * h
         coefficients = ndimage.spline_filter(f(nodes), 3, output=np.float64).astype(np.float32)
-        grid = DistanceGrid(np.zeros(3), h, coefficients, np.empty((0, 8)))
+        count = len(nodes) // 8
+        blocks = np.argwhere(np.ones([count] * 3))
+        numbers = np.arange(count**3, dtype=np.int32).reshape([count] * 3)
+        bricks = _bricks(coefficients, blocks)
+        far = np.zeros(numbers.shape, dtype=np.float32)
+        grid = DistanceGrid(np.zeros(3), h, bricks, numbers, far, np.empty((0, 8)))
         d, g, H = grid.evaluate(points)
         k, m = np.array([1.0, 0.7, -0.4]), np.array([0.3, -0.9, 0.8])
         slope = np.cos(points @ k)[:, None] * k - np.sin(points @ m)[:, None] * m
@@ -103,10 +108,11 @@ def test_everywhere_close_to_the_mesh():
     mesh = MeshDistance(surface).distance(points)
     error = np.abs(grid.distance(points) - mesh)
     assert (np.sign(grid.distance(points)) == np.sign(mesh))[np.abs(mesh) > 0.03].all()
-    # On ridges of the distance a spline is off by some of its spacing, elsewhere by much less.
+    # On ridges of the distance a spline is off by some of its spacing, elsewhere by much less; far
+    # from the wall it is interpolated between the centres of blocks 8 spacings wide.
     assert np.quantile(error[np.abs(mesh) < 0.3], 0.99) < 0.1 * spacing
-    assert error[mesh < 0].max() < 0.6 * spacing
-    assert error.max() < 0.4
+    assert error[np.abs(mesh) < 0.3].max() < 0.6 * spacing
+    assert error.max() < 0.6
 
 
 @pytest.mark.parametrize(
@@ -128,7 +134,7 @@ def test_a_rough_surface_passes():
     grid = DistanceGrid.of(replace(surface, vertices=vertices), 0.1)
     points = np.column_stack([RNG.uniform(-0.6, 0.6, (500, 2)), RNG.uniform(0, 4, 500)])
     expected = np.hypot(*points[:, :2].T) - 1
-    assert_allclose(grid.distance(points), expected, atol=0.06)
+    assert_allclose(grid.distance(points), expected, atol=0.15)
 
 
 def flipped_patch():
@@ -214,9 +220,9 @@ def test_too_large_a_grid_is_refused():
 
 
 def test_usual_spacing():
-    # Where nothing asks for less 0.1 mm; a lumen of R asks for 0.1 R^3/4, a wire for 4 radii.
+    # Where nothing asks for less 0.1 mm; a lumen of R asks for 0.1 R^3/4, a wire for 8 radii.
     assert_allclose(usual_spacing(cylinder(2.0, 10.0), 0.05), 0.1)
-    assert_allclose(usual_spacing(cylinder(2.0, 10.0), 0.015), 0.06)
+    assert_allclose(usual_spacing(cylinder(2.0, 10.0), 0.007), 0.056)
     assert_allclose(usual_spacing(cylinder(0.5, 4.0), 0.05), 0.1 * 0.5**0.75, rtol=0.05)
     wide = replace(SHAPES["cylinder, R = 1"][0](), openings=())
     wide = replace(wide, vertices=wide.vertices * [40.0, 40.0, 10.0])

@@ -58,10 +58,15 @@ def test_union_is_watertight_and_on_the_wall(shape):
     assert is_watertight(triangles)
     s = vessel.centreline.closest(vertices)[1]
     between = (s > 1e-6) & (s < vessel.centreline.length - 1e-6)
-    sharp = SaccularVessel(vessel.tube, vessel.aneurysm, neck_fillet=0.0)
-    assert_allclose(sharp.distance(vertices)[between], 0, atol=5e-3)
-    apart = between & (np.abs(vessel.distance(vertices) - sharp.distance(vertices)) == 0)
-    assert np.median(np.abs(vessel.distance(vertices)[apart])) < 1e-12
+    assert_allclose(vessel.distance(vertices)[between], 0, atol=1e-9)
+    middles = vertices[triangles].mean(axis=1)
+    inner = between[triangles].all(axis=1)
+    # A facet of the tube is 0.7 µm within the wall, of the larger sphere or the fillet more.
+    assert_allclose(vessel.distance(middles)[inner], 0, atol=5e-3)
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), vessel.evaluate(middles)[1])[inner]
+    # Slivers of the union's may be turned over.
+    assert -outward[outward < 0].sum() < 1e-5 * outward.sum()
 
 
 def test_volume_of_a_bent_tube_is_area_times_length():

@@ -21,8 +21,8 @@ MOST_POINTS = 250_000_000
 """Largest grid: 1 GB."""
 FINEST, USUAL, COARSEST = 0.03, 0.1, 0.15
 """Spacings, mm: the least and the largest that is taken where it fits, and the largest at all."""
-# A sharp edge is rounded by some 0.2 h, which stays below the radius of a wire.
-_WIRES = 4.0
+# A sharp edge is rounded by some 0.2 h, which stays near the radius of a wire.
+_WIRES = 8.0
 # Places of the wall at which the lumen's width is measured.
 _PLACES = 500
 
@@ -30,7 +30,7 @@ _PLACES = 500
 def usual_spacing(surface: LumenSurface, wire_radius: float) -> float:
     """Spacing, mm, of the grid for a vessel and wires of ``wire_radius`` mm.
 
-    At most 0.1 mm, 4 wire radii and 0.1 mm (R/1 mm)^¾, which holds the error of the spline, some
+    At most 0.1 mm, 8 wire radii and 0.1 mm (R/1 mm)^¾, which holds the error of the spline, some
     h⁴/R³, to that of a lumen of radius R = 1 mm; at least 0.03 mm, and as large as a grid of 250
     million points makes necessary. R is the radius of the ball that fits into the lumen at a
     narrow place (5 % of the wall have less). ``InputError`` if 0.15 mm is too fine for the grid.

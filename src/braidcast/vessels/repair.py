@@ -18,9 +18,9 @@ def repaired(vertices: Array, triangles: IntArray, *, open_lids: bool = True) ->
     """The wall that vertices (n, 3) mm and triangles (m, 3) in any state are meant to be.
 
     Joins vertices and seams; removes triangles that are double or have no area, and loose crumbs;
-    turns triangles outwards; opens flat lids, if told to; fills small holes in the wall. Each of these leaves a
-    remark. The order of the triangles given and their facing make no difference to the result,
-    whose openings come by falling size. A closed surface without flat lids has no opening.
+    turns triangles outwards; opens flat lids, if told to; fills small holes in the wall. Each of
+    these leaves a remark. The order of the triangles given and their facing make no difference to
+    the result, whose openings come by falling size. A closed surface without flat lids has none.
 
     ``InputError``, its text to follow the surface's name, for what cannot be mended: coordinates
     that are no numbers, no area, several pieces, edges of three triangles, one side only, large

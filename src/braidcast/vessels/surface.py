@@ -1,7 +1,6 @@
 """The lumen's surface as triangles, and its STL file.
 
-Vertices lie on the exact tube and sphere, those of the neck on the triangles of the two. The edge
-of the neck is drawn sharp, where the signed distance of ``SaccularVessel`` rounds it.
+Vertices lie on the exact wall of the vessel, at the neck on its rounded edge.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from braidcast.atomic import write_atomically
 from braidcast.errors import InputError
+from braidcast.vessels.neck_surface import rounded_neck
 from braidcast.vessels.parametric import SaccularVessel, Tube
 
 if TYPE_CHECKING:
@@ -27,6 +27,9 @@ Triangles = tuple[NDArray[np.float64], NDArray[np.int64]]
 _STL_TRIANGLE = np.dtype(
     [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")], align=False
 )
+
+FLAT = 3e-4
+"""The finest bumps of the rounded neck that stay, mm."""
 
 
 def vessel_surface(vessel: SaccularVessel | SurfaceVessel, facets: int = 120) -> Triangles:
@@ -46,8 +49,10 @@ def vessel_surface(vessel: SaccularVessel | SurfaceVessel, facets: int = 120) ->
     if vessel.aneurysm is not None:
         sphere = manifold3d.Manifold.sphere(vessel.aneurysm.radius, facets)
         body += sphere.translate(vessel.aneurysm.centre.tolist())
-    mesh = body.to_mesh64()
-    return np.array(mesh.vert_properties[:, :3]), np.array(mesh.tri_verts, dtype=np.int64)
+    vertices, triangles = _mesh(body)
+    if vessel.aneurysm is None or vessel.neck_fillet == 0.0:
+        return vertices, triangles
+    return _mesh(_solid(*rounded_neck(vessel, vertices, triangles)).simplify(FLAT))
 
 
 def _tube_surface(tube: Tube, facets: int) -> Triangles:
@@ -85,6 +90,11 @@ def _binormal(tangents: NDArray[np.float64]) -> NDArray[np.float64]:
     if np.linalg.norm(across) < 1e-9:
         across = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
     return across / np.linalg.norm(across)
+
+
+def _mesh(body: manifold3d.Manifold) -> Triangles:
+    mesh = body.to_mesh64()
+    return np.array(mesh.vert_properties[:, :3]), np.array(mesh.tri_verts, dtype=np.int64)
 
 
 def _solid(vertices: NDArray[np.float64], triangles: NDArray[np.int64]) -> manifold3d.Manifold:

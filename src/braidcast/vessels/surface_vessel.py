@@ -224,7 +224,7 @@ def _centreline(
         if ends is None:
             ends = _farthest_ends(source, surface)
         bounds = np.array([surface.vertices.min(axis=0), surface.vertices.max(axis=0)])
-        return find_centreline(wall.distance, bounds, ends), []
+        return find_centreline(wall.distance, bounds, ends, _end_radii(surface, ends)), []
     given = read_centreline(source.centreline, ends)
     line = Polyline.through(given.points, given.radii)
     inside = _share_inside(line, wall)
@@ -240,6 +240,15 @@ def _centreline(
             f"length, must for 90 % at least{guess}"
         )
     return line if line.radii is not None else _with_depths(line, wall), list(given.remarks)
+
+
+def _end_radii(surface: LumenSurface, ends: Array) -> Array | None:
+    """Radii (2,) of the openings at the ends; None unless each end lies in one."""
+    radii = []
+    for end in ends:
+        here = [o.radius for o in surface.openings if np.linalg.norm(end - o.centre) < o.radius]
+        radii += here[:1]
+    return np.array(radii) if len(radii) == 2 else None
 
 
 def _share_inside(line: Polyline, wall: MeshDistance) -> float:
