@@ -46,6 +46,8 @@ def _suggestion(keys: list[str], here: type[BaseModel], model: type[BaseModel], 
     """The known key that was probably meant, or the keys that are allowed there, in ``here``."""
     *table, key = keys
     known = {".".join(path): path for path in _paths(model)}
+    if ".".join(keys) in known:  # in another kind of the same table
+        return f"[{'.'.join(table)}] takes {', '.join(here.model_fields)} here"
     for name, path in known.items():
         if path[-1].lower() == key.lower():
             return f"did you mean {name}?"
