@@ -74,7 +74,12 @@ def test_its_own_surface_gives_the_same_deployment(
     assert ours.outcome == theirs.outcome and ours.end_nodes_in_sac == theirs.end_nodes_in_sac
     apart = np.linalg.norm(ours.positions - theirs.positions, axis=1)
     assert apart.mean() < 5e-3 and apart.max() < 30e-3
-    np.testing.assert_allclose(ours.wire_distance, theirs.wire_distance, atol=0.02)
+    # In the depth of the neck the parametric distance is a lower bound.
+    assert (ours.wire_distance > theirs.wire_distance - 0.02).all()
+    at_wall = theirs.wire_distance < 0.02
+    assert at_wall.mean() > 0.3
+    apart = np.abs(ours.wire_distance - theirs.wire_distance)[at_wall]
+    assert np.quantile(apart, 0.99) < 2e-3
 
 
 def test_distance_is_that_of_the_parametric_vessel(
@@ -157,9 +162,7 @@ def test_sites(parametric: Case, tables: dict[str, Any], site: dict, start: floa
         ("site.point", [0.0, 7.5, 20.0], "site.eta and site.point: 2 given, must be exactly one"),
     ],
 )
-def test_what_is_wrong_is_named(
-    tables: dict[str, Any], field: str, value: Any, says: str
-) -> None:
+def test_what_is_wrong_is_named(tables: dict[str, Any], field: str, value: Any, says: str) -> None:
     with pytest.raises(InputError) as caught:
         Case.from_dict(spoilt(tables, field, value))
     text = str(caught.value)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from braidcast.devices import Braid
+from braidcast.feasibility import MARGIN
 from braidcast.vessels.surface_vessel import SurfaceVessel
 
 Array = NDArray[np.float64]
@@ -71,8 +72,9 @@ class VesselInspection:
         good = (fits & touches).astype(int)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], good, [0]])))
         runs = zip(self.along[edges[::2]], self.along[edges[1::2] - 1], strict=True)
-        spare = self.crimped_length
-        return [(float(a), float(b - spare)) for a, b in runs if b - a >= spare]
+        needed, last = self.crimped_length, self.along[-1] - MARGIN
+        starts = [(float(a), float(min(b, last)) - needed) for a, b in runs]
+        return [(a, b) for a, b in starts if b >= a]
 
     @cached_property
     def grid_error(self) -> float:

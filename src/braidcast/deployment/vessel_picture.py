@@ -97,4 +97,4 @@ def _curvature(axis: Axes, seen: VesselInspection) -> None:
     axis.set_ylabel("1/mm")
     axis.set_xlabel("arc length from the proximal end (mm)")
     axis.set_title("curvature")
-    axis.legend(loc="upper right")
+    axis.legend(loc="center left")
