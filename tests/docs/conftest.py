@@ -164,7 +164,8 @@ class Page:
         assert self.shown is not None, "a block of text must show what the block before it writes"
         if self.complaint:
             # A page shows what a command that fails has to say.
-            assert expected.startswith("braidcast: "), self.complaint
+            starts = ("braidcast: ", "...\nbraidcast: ")
+            assert expected.startswith(starts), self.complaint
         written = "\n--- and to standard error:\n".join(self.shown)
         assert any(same(expected, out) for out in self.shown), (
             f"the page shows\n{expected}\nbut there was\n{written}"

@@ -14,7 +14,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_case_file_is_the_main_example_with_all_defaults_written_out() -> None:
-    (text,) = re.findall(r"^```toml\n(.*?)^```", README, flags=re.DOTALL | re.MULTILINE)
+    text, _ = re.findall(r"^```toml\n(.*?)^```", README, flags=re.DOTALL | re.MULTILINE)
     shown = Case.from_dict(tomllib.loads(text))
     example = Case.from_toml(ROOT / "examples" / "success.toml")
     assert shown.braid == example.braid

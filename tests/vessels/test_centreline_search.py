@@ -185,15 +185,15 @@ def test_given_radii_of_the_ends_need_not_be_right():
 def test_hidden_wall_is_refused():
     vessel = with_sac(20.0, 6.0, 0.0)
     bounds = np.array([[-20.0, -25.0, -3.0], [20.0, 25.0, 43.0]])
-    with pytest.raises(InputError, match=r"^no centreline found: .* mm about .*centreline`$"):
+    with pytest.raises(InputError, match=r"^ends = .* mm: no centreline found: .*centreline`$"):
         find_centreline(vessel.distance, bounds, ENDS)
 
 
 def test_ends_that_cannot_be_used_are_refused():
     vessel = with_sac(7.0, 3.75, 0.0)
-    with pytest.raises(InputError, match="second end .* must lie in the lumen"):
+    with pytest.raises(InputError, match="ends = .* mm: the second must lie in the lumen"):
         find_centreline(vessel.distance, BOUNDS, [ENDS[0], [12.0, 0.0, 30.0]])
-    with pytest.raises(InputError, match="second end .* from the middle of the vessel"):
+    with pytest.raises(InputError, match="the second .* from the middle of the vessel"):
         find_centreline(vessel.distance, BOUNDS, [ENDS[0], vessel.aneurysm.centre])
     with pytest.raises(InputError, match="apart, must be more than"):
         find_centreline(vessel.distance, BOUNDS, ARCH.at_arc_length([5.0, 7.0]))

@@ -53,18 +53,26 @@ def find_centreline(
     cut where it is nearest to them. ``end_radii`` (2,) mm are those of the lumen there; without
     them they are those of the largest balls that hold the ends.
 
-    ``InputError`` if an end is not in the lumen, the lumen does not join the ends, or the result
-    is doubtful: the wall is hidden along more than two diameters, or is not that of a tube.
+    ``InputError``, beginning with ``ends``, if one is not in the lumen, the lumen does not join
+    them, or the result is doubtful: the wall is hidden along more than two diameters, or is not
+    that of a tube.
     """
     bounds, ends = np.asarray(bounds, dtype=np.float64), np.asarray(ends, dtype=np.float64)
     given = None if end_radii is None else np.asarray(end_radii, dtype=np.float64)
+    try:
+        return _found(distance, bounds, ends, given)
+    except InputError as error:
+        raise InputError(f"ends = {_place(ends[0])} and {_place(ends[1])}: {error}") from None
+
+
+def _found(distance: Distance, bounds: Array, ends: Array, given: Array | None) -> Polyline:
     path, radii = lumen_path(distance, bounds, ends, given)
     typical = float(radii.mean())
     apart = float(np.linalg.norm(ends[1] - ends[0]))
     if apart < 2.0 * typical or len(path) < 4:
         raise InputError(
-            f"ends {_place(ends[0])} and {_place(ends[1])} are {apart:.3g} mm apart, must be more "
-            f"than {2.0 * typical:.3g} mm, the diameter of the lumen"
+            f"they are {apart:.3g} mm apart, must be more than {2.0 * typical:.3g} mm, the "
+            "diameter of the lumen"
         )
     line = Polyline.through(path, smoothing=typical)
     s = _stations(line, ends, typical)
@@ -169,8 +177,8 @@ def _refuse_far_ends(line: Polyline, ends: Array) -> None:
         away, radius = float(np.linalg.norm(end - place)), float(line.lumen_radius(s)[0])
         if away > 1.5 * radius:
             raise InputError(
-                f"{name} end {_place(end)} is {away:.3g} mm from the middle of the vessel, must be "
-                f"less than {1.5 * radius:.3g} mm"
+                f"the {name} is {away:.3g} mm from the middle of the vessel, must be less than "
+                f"{1.5 * radius:.3g} mm"
             )
 
 

@@ -68,9 +68,9 @@ class DistanceGrid:
     ) -> DistanceGrid:
         """Samples a surface, its wall continued by 5 mm at the openings, ``spacing`` mm apart.
 
-        ``progress`` is called with the share done, 0 to 1. ``InputError`` for a surface that
-        crosses itself or is turned inside out somewhere, for an opening that cannot be continued,
-        and for a grid of more than 250 million points.
+        ``progress`` is called with the share done, 0 to 1. ``InputError``, its text to follow the
+        surface's name, for one that crosses itself or is turned inside out somewhere, for an
+        opening that cannot be continued, and for a grid of more than 250 million points.
         """
         longer = extended(surface, EXTENSION)
         low = longer.vertices.min(axis=0) - MARGIN
@@ -79,10 +79,11 @@ class DistanceGrid:
         low, shape = low - spacing, grid_shape(size, spacing)
         if math.prod(shape) > MOST_POINTS:
             raise InputError(
-                f"spacing = {spacing:.4g} mm makes {math.prod(shape) / 1e6:.0f} million grid points"
-                f" of a surface of {' x '.join(f'{s:.0f}' for s in size)} mm, at most "
-                f"{MOST_POINTS / 1e6:.0f} million are allowed: take a spacing of "
-                f"{least_spacing(size) + 5e-4:.3f} mm or cut the surface to the part that is needed"
+                f"is {' x '.join(f'{s:.0f}' for s in size)} mm with its continued ends, which "
+                f"makes {math.prod(shape) / 1e6:.0f} million points of a grid with the "
+                f"distance_spacing of {spacing:.4g} mm, where at most {MOST_POINTS / 1e6:.0f} "
+                f"million are allowed: take {least_spacing(size) + 5e-4:.3f} mm or cut the surface "
+                "to the part that is needed"
             )
         blocks = (shape[0] // BLOCK, shape[1] // BLOCK, shape[2] // BLOCK)
         reach = max(0.3, 5.0 * spacing)
@@ -182,7 +183,7 @@ def _require_one_side(
     """``InputError`` where the side changes without a wall between, except beyond an open end."""
     corners = field[:: field.shape[0] - 1, :: field.shape[1] - 1, :: field.shape[2] - 1]
     if np.count_nonzero(corners < 0.0) > 4:
-        raise InputError("surface is turned inside out: its triangles must face out of the lumen")
+        raise InputError("is turned inside out: its triangles must face out of the lumen")
     found = jumps(field, spacing, reach)
     places = origin + spacing * (found[:, :3] + 0.5 * np.eye(3)[found[:, 3]])
     for end in ends:
@@ -198,7 +199,7 @@ def _require_one_side(
         first = places[labels[tuple(found[:, :3].T // BLOCK)] == 1]
         x, y, z = first[np.argmin(np.linalg.norm(first - first.mean(axis=0), axis=1))]
         raise InputError(
-            "surface crosses itself, is folded or turned inside out near "
+            "crosses itself, is folded or turned inside out near "
             f"({x:.2f}, {y:.2f}, {z:.2f}) mm"
             + (f" and at {count - 1} more places" if count > 1 else "")
             + ": which side of it is the lumen must be clear everywhere"

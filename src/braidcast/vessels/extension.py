@@ -31,7 +31,7 @@ def extended(surface: LumenSurface, length: float) -> LumenSurface:
     The new ends are plane, square to the normal and ``length`` mm beyond the outermost vertex of
     the old rim; they are the openings of the result. Where the wall would come nearer than 0.2 mm
     to the rest of the vessel it is half as long, or a quarter, and so on, with a remark;
-    ``InputError`` if not even 1 mm fits.
+    ``InputError``, its text to follow the surface's name, if not even 1 mm fits.
     """
     for index in range(len(surface.openings)):
         surface = _with_longer_end(surface, index, length)
@@ -52,7 +52,7 @@ def _with_longer_end(surface: LumenSurface, index: int, length: float) -> LumenS
     x, y, z = opening.centre
     if fitting > free:
         raise InputError(
-            f"surface has an opening at ({x:.4g}, {y:.4g}, {z:.4g}) mm that cannot be continued "
+            f"has an opening at ({x:.4g}, {y:.4g}, {z:.4g}) mm that cannot be continued "
             f"straight by {SHORTEST:g} mm without meeting the rest of the vessel: cut the vessel "
             "elsewhere there"
         )

@@ -33,13 +33,14 @@ def usual_spacing(surface: LumenSurface, wire_radius: float) -> float:
     At most 0.1 mm, 8 wire radii and 0.1 mm (R/1 mm)^¾, which holds the error of the spline, some
     h⁴/R³, to that of a lumen of radius R = 1 mm; at least 0.03 mm, and as large as a grid of 250
     million points makes necessary. R is the radius of the ball that fits into the lumen at a
-    narrow place (5 % of the wall have less). ``InputError`` if 0.15 mm is too fine for the grid.
+    narrow place (5 % of the wall have less). ``InputError``, its text to follow the surface's name,
+    if 0.15 mm is too fine for the grid.
     """
     size = grown_size(surface)
     least = least_spacing(size)
     if least > COARSEST:
         raise InputError(
-            f"surface is {' x '.join(f'{side:.0f}' for side in size)} mm with its continued ends, "
+            f"is {' x '.join(f'{side:.0f}' for side in size)} mm with its continued ends, "
             f"too large for a grid of {MOST_POINTS / 1e6:.0f} million points {COARSEST} mm apart: "
             "cut it to the part of the vessel that is needed"
         )

@@ -59,7 +59,8 @@ def lumen_path(
 
     It is the path on which ∫ ds / min(depth, larger radius of the ends)² is least: an aneurysm,
     however deep, draws it aside no more than the vessel itself. ``bounds`` (2, 3) mm hold the
-    lumen. ``InputError`` if an end is not in the lumen or the lumen does not join them.
+    lumen. ``InputError``, its text to follow the ends, if one is not in the lumen or the lumen does
+    not join them.
     """
     grid = _whole_grid(distance, bounds)
     radii = None
@@ -74,18 +75,16 @@ def lumen_path(
         if fine_enough or grid.spacing <= finest or len(grid.index) > _MOST_NODES:
             break
         grid = grid.halved(distance)
-    for name, end, radius in zip(("first", "second"), ends, found, strict=True):
+    for name, radius in zip(("first", "second"), found, strict=True):
         if radius <= 0.0:
-            raise InputError(f"{name} end {_place(end)} must lie in the lumen or at its wall")
+            raise InputError(f"the {name} must lie in the lumen or at its wall")
     assert radii is not None
     path = _cheapest(grid, ends, radii)
     if path is None and len(grid.index) <= _MOST_NODES:
         # A stenosis may be narrower than the grid.
         path = _cheapest(grid.halved(distance), ends, radii)
     if path is None:
-        raise InputError(
-            f"ends {_place(ends[0])} and {_place(ends[1])} must be joined by the lumen"
-        )
+        raise InputError("they must be joined by the lumen")
     return path, radii
 
 
@@ -134,7 +133,3 @@ def _cheapest(grid: _Grid, ends: Array, radii: Array) -> Array | None:
             return None
         path.append(before[path[-1]])
     return points[path[::-1]]
-
-
-def _place(point: Array) -> str:
-    return f"({point[0]:.4g}, {point[1]:.4g}, {point[2]:.4g}) mm"

@@ -24,8 +24,8 @@ class MeshDistance:
     """Signed distance to the triangles of a surface, negative on the side of the lumen.
 
     Exact to double precision, except that of two walls whose distances differ by less than single
-    precision resolves (some 1e-6 of the surface's size) either may be taken. ``InputError`` if
-    fcpw is not installed.
+    precision resolves (some 1e-6 of the surface's size) either may be taken. ``InputError``, its
+    text to follow the surface's name, if fcpw is not installed.
     """
 
     def __init__(self, surface: LumenSurface) -> None:
@@ -91,8 +91,8 @@ def _scene(vertices: Array, triangles: NDArray[np.int64]) -> object:
         import fcpw
     except ImportError as problem:
         raise InputError(
-            "a vessel from a surface file needs the package fcpw, which is not installed or has no "
-            "build for this machine"
+            "needs the package fcpw to be used, which is not installed or has no build for this "
+            "machine"
         ) from problem
     scene = fcpw.scene_3D()
     scene.set_object_count(1)

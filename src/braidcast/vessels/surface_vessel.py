@@ -7,7 +7,8 @@ it, under a name that changes with everything it depends on.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -15,15 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline
 
 from braidcast.errors import InputError
 from braidcast.vessels.centreline import as_rows
 from braidcast.vessels.centreline_file import flipped_lps_ras, read_centreline
 from braidcast.vessels.centreline_search import find_centreline
-from braidcast.vessels.distance_grid import EXTENSION, DistanceGrid
+from braidcast.vessels.distance_grid import DistanceGrid
 from braidcast.vessels.extension import extended
-from braidcast.vessels.grid_spacing import usual_spacing
+from braidcast.vessels.grid_spacing import EXTENSION, usual_spacing
 from braidcast.vessels.kept_arrays import keep, read_kept
 from braidcast.vessels.lumen_surface import LumenSurface, Opening
 from braidcast.vessels.mesh_distance import MeshDistance
@@ -91,7 +91,8 @@ class SurfaceVessel:
 
     @cached_property
     def _wall(self) -> MeshDistance:
-        return MeshDistance(extended(self.surface, EXTENSION))
+        with _about(f"surface = {self.name}"):
+            return MeshDistance(extended(self.surface, EXTENSION))
 
 
 def load_vessel(source: SurfaceSource, progress: Progress | None = None) -> SurfaceVessel:
@@ -145,27 +146,13 @@ def _arrays(vessel: SurfaceVessel) -> dict[str, NDArray[Any]]:
         "rim_sizes": np.array([len(o.rim) for o in surface.openings], dtype=np.int64),
         "remarks": np.array([*vessel.remarks, ""]),
         "centreline_found": np.array(vessel.centreline_found),
-        **_curve_arrays("line", vessel.centreline.curve),
-        **_curve_arrays("radius", vessel.centreline.radius_curve),
-        "radius_range": np.array(vessel.centreline.radius_range),
+        **{f"line_{name}": values for name, values in vessel.centreline.arrays().items()},
         **{f"grid_{name}": values for name, values in vessel.grid.arrays().items()},
-    }
-
-
-def _curve_arrays(name: str, curve: BSpline | None) -> dict[str, NDArray[Any]]:
-    assert curve is not None
-    return {
-        f"{name}_knots": curve.t,
-        f"{name}_shares": curve.c,
-        f"{name}_degree": np.array(curve.k),
     }
 
 
 def _restored(name: str, kept: Mapping[str, NDArray[Any]]) -> SurfaceVessel | None:
     """The vessel of these arrays; None if they are not all there."""
-
-    def curve(name: str) -> BSpline:
-        return BSpline(kept[f"{name}_knots"], kept[f"{name}_shares"], int(kept[f"{name}_degree"]))
 
     def part(prefix: str) -> dict[str, NDArray[Any]]:
         return {k.removeprefix(prefix): v for k, v in kept.items() if k.startswith(prefix)}
@@ -180,7 +167,7 @@ def _restored(name: str, kept: Mapping[str, NDArray[Any]]) -> SurfaceVessel | No
         return SurfaceVessel(
             name,
             LumenSurface(kept["vertices"], kept["triangles"], openings),
-            Polyline(curve("line"), curve("radius"), tuple(kept["radius_range"].tolist())),
+            Polyline.from_arrays(part("line_")),
             DistanceGrid.from_arrays(part("grid_")),
             bool(kept["centreline_found"]),
             tuple(str(remark) for remark in kept["remarks"][:-1]),
@@ -197,13 +184,16 @@ def _made(source: SurfaceSource, report: Progress) -> SurfaceVessel:
     name = Path(source.surface).name
     report("surface", 0.0)
     surface = read_surface(source.surface, source.units)
-    wall = MeshDistance(extended(surface, EXTENSION))
+    where = f"surface = {source.surface}"
+    with _about(where):
+        wall = MeshDistance(extended(surface, EXTENSION))
     report("surface", 1.0)
     report("centreline", 0.0)
     line, remarks = _centreline(source, surface, wall)
     report("centreline", 1.0)
-    spacing = source.spacing or usual_spacing(surface, source.wire_radius)
-    grid = DistanceGrid.of(surface, spacing, partial(report, "distance"))
+    with _about(where):
+        spacing = source.spacing or usual_spacing(surface, source.wire_radius)
+        grid = DistanceGrid.of(surface, spacing, partial(report, "distance"))
     report("distance", 1.0)
     return SurfaceVessel(
         name,
@@ -215,18 +205,29 @@ def _made(source: SurfaceSource, report: Progress) -> SurfaceVessel:
     )
 
 
+@contextmanager
+def _about(where: str) -> Iterator[None]:
+    """Put the field and its value before what is said of them."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where} {error}") from None
+
+
 def _centreline(
     source: SurfaceSource, surface: LumenSurface, wall: MeshDistance
 ) -> tuple[Polyline, list[str]]:
     """The centreline, given or found, with the lumen's radius along it."""
     ends = None if source.ends is None else np.array(source.ends)
+    where = f"centreline = {source.centreline}"
     if source.centreline is None:
         if ends is None:
             ends = _farthest_ends(source, surface)
         bounds = np.array([surface.vertices.min(axis=0), surface.vertices.max(axis=0)])
         return find_centreline(wall.distance, bounds, ends, _end_radii(surface, ends)), []
     given = read_centreline(source.centreline, ends)
-    line = Polyline.through(given.points, given.radii)
+    with _about(f"{where}:"):
+        line = Polyline.through(given.points, given.radii)
     inside = _share_inside(line, wall)
     if inside < 0.9:
         turned = Polyline.through(flipped_lps_ras(given.points))
@@ -236,7 +237,7 @@ def _centreline(
             else ""
         )
         raise InputError(
-            f"centreline = {source.centreline} lies within the surface for {inside:.0%} of its "
+            f"{where} lies within the surface for {inside:.0%} of its "
             f"length, must for 90 % at least{guess}"
         )
     return line if line.radii is not None else _with_depths(line, wall), list(given.remarks)
