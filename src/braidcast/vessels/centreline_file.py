@@ -20,12 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from braidcast.errors import InputError
 from braidcast.vessels.centreline_branches import way_through
+from braidcast.vessels.input_file import checked_ending
 from braidcast.vessels.vtk_file import read_vtk_lines
 
 Array = NDArray[np.float64]
 Line = tuple[Array, Array | None]
 """Points (n, 3) mm and radii (n,) mm if they are known."""
 
+ENDINGS = (".vtp", ".vtk", ".json", ".csv")
 RADIUS_NAMES = ("maximuminscribedsphereradius", "radius", "lumen_radius")
 """Names of the radius, in any case."""
 _FARTHEST_END = 5.0
@@ -55,9 +57,7 @@ def read_centreline(path: str | os.PathLike[str], ends: ArrayLike | None = None)
     from the lines or not joined by them, and fewer than four points.
     """
     where = f"centreline = {os.fspath(path)}"
-    reader = _READERS.get(Path(path).suffix.lower())
-    if reader is None:
-        raise InputError(f"{where} must be a file .vtp, .vtk, .json or .csv")
+    reader = _READERS[checked_ending(path, "centreline", ENDINGS)]
     lines, remarks = reader(Path(path), where)
     _refuse_bad_values(lines, where)
     if ends is not None:

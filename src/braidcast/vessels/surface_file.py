@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import stat
 import warnings
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from braidcast.errors import InputError
 from braidcast.vessels.edges import Array, IntArray
+from braidcast.vessels.input_file import checked_ending
 from braidcast.vessels.lumen_surface import LumenSurface
 from braidcast.vessels.orientation import lumen_radius
 from braidcast.vessels.repair import repaired
@@ -21,9 +21,6 @@ from braidcast.vessels.vtk_file import read_vtk_polygons
 from braidcast.vessels.wording import counted, was
 
 ENDINGS = (".stl", ".ply", ".obj", *VTK_ENDINGS)
-
-#: Ten million triangles; a vessel has a hundred thousand.
-LARGEST_BYTES = 1_000_000_000
 
 
 def read_surface(
@@ -38,12 +35,7 @@ def read_surface(
     """
     factor = millimetres(units)
     where = f"surface = {os.fspath(path)}"
-    try:
-        ending = _checked_ending(Path(path))
-    except OSError as error:
-        raise InputError(f"{where} cannot be read: {error.strerror or error}") from None
-    except InputError as error:
-        raise InputError(f"{where} {error}") from None
+    ending = checked_ending(path, "surface", ENDINGS)
     if ending in VTK_ENDINGS:
         vertices, triangles, polygons = read_vtk_polygons(path)
     else:
@@ -68,23 +60,6 @@ def read_surface(
     return LumenSurface(
         surface.vertices, surface.triangles, surface.openings, (remark, *surface.remarks)
     )
-
-
-def _checked_ending(path: Path) -> str:
-    """The ending, lower case, of a file that is there and not too large."""
-    if (ending := path.suffix.lower()) not in ENDINGS:
-        raise InputError(f"must end in one of {', '.join(ENDINGS)}")
-    status = path.stat()
-    if not stat.S_ISREG(status.st_mode):
-        raise InputError("is no file")
-    if status.st_size == 0:
-        raise InputError("is an empty file")
-    if status.st_size > LARGEST_BYTES:
-        raise InputError(
-            f"has {status.st_size / 1e9:.1f} GB, where at most {LARGEST_BYTES / 1e9:g} GB is read: "
-            "reduce the number of its triangles"
-        )
-    return ending
 
 
 def _read_by_trimesh(path: Path, ending: str, where: str) -> tuple[Array, IntArray, int]:

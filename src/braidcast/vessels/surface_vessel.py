@@ -19,15 +19,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from braidcast.errors import InputError
 from braidcast.vessels.centreline import as_rows
+from braidcast.vessels.centreline_file import ENDINGS as CENTRELINES
 from braidcast.vessels.centreline_file import flipped_lps_ras, read_centreline
 from braidcast.vessels.centreline_search import find_centreline
 from braidcast.vessels.distance_grid import DistanceGrid
 from braidcast.vessels.extension import extended
 from braidcast.vessels.grid_spacing import EXTENSION, usual_spacing
+from braidcast.vessels.input_file import checked_ending
 from braidcast.vessels.kept_arrays import keep, read_kept
 from braidcast.vessels.lumen_surface import LumenSurface, Opening
 from braidcast.vessels.mesh_distance import MeshDistance
 from braidcast.vessels.polyline import Polyline
+from braidcast.vessels.surface_file import ENDINGS as SURFACES
 from braidcast.vessels.surface_file import read_surface
 
 if TYPE_CHECKING:
@@ -124,13 +127,14 @@ def _key(source: SurfaceSource) -> str:
     """Sixteen hexadecimal digits that change with the files and how they are read."""
     how = (VERSION, source.units, source.ends, source.spacing, source.wire_radius)
     digest = hashlib.sha256(repr(how).encode())
-    for field in ("surface", "centreline"):
-        path = getattr(source, field)
+    files = (("surface", source.surface, SURFACES), ("centreline", source.centreline, CENTRELINES))
+    for field, path, endings in files:
         if path is not None:
+            ending = checked_ending(path, field, endings)
             try:
-                digest.update(Path(path).suffix.encode() + Path(path).read_bytes())
-            except (OSError, ValueError) as error:
-                reason = getattr(error, "strerror", None) or error
+                digest.update(ending.encode() + Path(path).read_bytes())
+            except OSError as error:
+                reason = error.strerror or error
                 raise InputError(f"{field} = {path} cannot be read: {reason}") from None
     return digest.hexdigest()[:16]
 
