@@ -7,13 +7,14 @@ BIN := $(VENV)/bin
 # More BLAS threads than cores make two test workers slower, not faster.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
-.PHONY: help demo study test lint types docs format clean
+.PHONY: help demo study browser test lint types docs format clean
 .NOTPARALLEL:
 
 help:
 	@echo "make demo    install braidcast in $(VENV) and simulate examples/success.toml into demo/"
 	@echo "make study   install and simulate the 900 cases of the study, or what is missing of them"
 	@echo "make test    install and run the tests"
+	@echo "make browser install the browser that the tests of the planner drive, if there is none"
 	@echo "make lint    ruff: rules and layout"
 	@echo "make types   mypy"
 	@echo "make docs    Sphinx: the site, from docs/ into docs/_build/html"
@@ -26,7 +27,17 @@ demo: $(VENV)/.installed-pictures
 study: $(VENV)/.installed-test
 	$(BIN)/python study/rebuild.py
 
-test: $(VENV)/.installed-test
+# The system's Chromium, installed where that is allowed; else Playwright's own.
+browser: $(VENV)/.installed-test
+	@for name in chromium chromium-browser google-chrome; do \
+	    if command -v $$name >/dev/null; then exit 0; fi; \
+	done; \
+	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	    apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -qq -y chromium && exit 0; \
+	fi; \
+	$(BIN)/python -m playwright install chromium
+
+test: $(VENV)/.installed-test browser
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n $(WORKERS) --dist worksteal
 
 lint: $(VENV)/.installed-dev

@@ -153,8 +153,8 @@ def test_the_other_axes_turn_x_and_y():
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("line.stl", "", r"must be a file .vtp, .vtk, .json or .csv"),
-        ("line.csv", "", "is empty"),
+        ("line.stl", "", r"must end in one of .vtp, .vtk, .json, .csv"),
+        ("line.csv", "", "is an empty file"),
         ("line.csv", "x,y,z\n", "holds no points"),
         ("line.csv", "x,y,r\n1,2,3\n", "must have x, y, z"),
         ("line.csv", "x,y,z\n1,2,3\n1,zwei,3\n", "line 3 must hold 3 numbers, not '1 zwei 3'"),
@@ -164,6 +164,7 @@ def test_the_other_axes_turn_x_and_y():
         ("line.csv", "1,2,3\n1,2,4\n1,2,4\n1,2,5\n", "3 different points"),
         ("line.json", "{", "is not JSON"),
         ("line.json", "[1, 2]", "not a markups file"),
+        ("line.json", "[" * 100_000, "not a markups file"),
         ("line.json", '{"markups": [{"type": "Curve"}]}', "not a markups file"),
         ("line.json", '{"markups": []}', "holds no curve"),
         ("line.json", '{"markups": [{"type": "Fiducial", "controlPoints": []}]}', "no curve"),

@@ -100,7 +100,7 @@ def test_radius_along_the_line_and_beyond(arch):
     assert_allclose(arch.lumen_radius(s), 2.0 + 0.01 * s, rtol=1e-3)
     assert_allclose(arch.lumen_radius([-9.0, 99.0]), arch.lumen_radius([0.0, arch.length]))
     bare = Polyline.through(ARCH.at_arc_length(s))
-    assert bare.radii is None
+    assert bare.radius_curve is None
     with pytest.raises(ValueError, match="not known"):
         bare.lumen_radius(1.0)
 
@@ -110,7 +110,7 @@ def test_arrays_hold_everything(arch):
     s = np.linspace(-1.0, arch.length + 1.0, 40)
     assert (back.at_arc_length(s) == arch.at_arc_length(s)).all()
     assert (back.lumen_radius(s) == arch.lumen_radius(s)).all()
-    assert Polyline.from_arrays(Polyline(arch.curve).arrays()).radii is None
+    assert Polyline.from_arrays(Polyline(arch.curve).arrays()).radius_curve is None
 
 
 def test_four_points_far_apart_are_met():

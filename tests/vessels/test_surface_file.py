@@ -13,7 +13,7 @@ from braidcast.errors import InputError
 from braidcast.vessels import QuadraticBezier, SaccularVessel, Tube, vessel_surface, write_stl
 from braidcast.vessels.repair import repaired
 from braidcast.vessels.surface_file import read_surface
-from braidcast.vessels.vtk_file import read_vtk_lines, read_vtk_surface
+from braidcast.vessels.vtk_file import read_vtk_lines, read_vtk_polygons
 
 
 def written(path, vertices, triangles):
@@ -273,7 +273,7 @@ def test_death_of_the_reading_process_is_told_apart(
     ended = subprocess.CompletedProcess([], returncode, b"", stderr)
     monkeypatch.setattr(vtk_file.subprocess, "run", lambda *_, **__: ended)
     with pytest.raises(InputError) as caught:
-        read_vtk_surface(tmp_path / "a.vtp")
+        read_vtk_polygons(tmp_path / "a.vtp")
     assert str(caught.value) == f"surface = {tmp_path / 'a.vtp'} {said}"
 
 

@@ -12,6 +12,7 @@ import typer
 from braidcast import __version__
 from braidcast.cli import dataset
 from braidcast.cli.messages import told
+from braidcast.cli.planner import planner
 from braidcast.cli.predict import predict
 from braidcast.cli.simulate import simulate
 from braidcast.cli.study import study
@@ -55,6 +56,7 @@ def _options(
 app.command(epilog="Example:  braidcast simulate examples/success.toml -o demo")(simulate)
 app.command(epilog="Example:  braidcast vessel artery.stl -o artery")(vessel)
 app.command(epilog="Example:  braidcast predict examples/success.toml -o predicted")(predict)
+app.command(epilog="Example:  braidcast planner examples/success.toml")(planner)
 app.command(epilog="Example:  braidcast train sixty -o sixty.npz")(train)
 app.command(epilog="Example:  braidcast evaluate sixty.npz sixty -o tested")(evaluate)
 app.command(epilog="Example:  braidcast card > model_card.md")(card)

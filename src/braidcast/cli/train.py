@@ -64,7 +64,7 @@ def train(
         rows = [
             ("model", f"{model.record['name']}"),
             ("modes", f"{tuning['modes']}"),
-            ("file", f"{output}, {output.stat().st_size / 1e6:.2g} MB"),
+            ("file", f"{output}, {output.stat().st_size / 1e6:.3g} MB"),
         ]
         tested = [] if evaluation is None else test_rows(evaluation)
         typer.echo(table([*rows, *tested]))

@@ -119,7 +119,7 @@ def _slicer_lines(path: Path, where: str) -> tuple[list[Line], list[str]]:
         lines = [line for m in curves if (line := _slicer_line(m)) is not None]
     except json.JSONDecodeError as error:
         raise InputError(f"{where} is not JSON: {error.msg} in line {error.lineno}") from None
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError):
+    except (AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError):
         raise InputError(f"{where} is not a markups file of 3D Slicer") from None
     if not lines:
         raise InputError(f"{where} holds no curve with points")

@@ -169,18 +169,6 @@ class Polyline:
         curvature = across / np.linalg.norm(velocity, axis=1) ** 3
         return np.where((s < 0.0) | (s > self.length), 0.0, curvature)
 
-    @property
-    def knows_radius(self) -> bool:
-        """Whether the lumen's radius is known along the curve."""
-        return self.radius_curve is not None
-
-    @property
-    def radii(self) -> Array | None:
-        """Lumen radii (n,) mm at n evenly spaced places from start to end; None if unknown."""
-        if self.radius_curve is None:
-            return None
-        return self.lumen_radius(np.linspace(0.0, self.length, len(self._starts[1])))
-
     def lumen_radius(self, s: ArrayLike) -> Array:
         """Radius (n,) mm of the lumen at arc lengths s (n,) mm, constant beyond the ends.
 

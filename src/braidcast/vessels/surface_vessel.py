@@ -7,8 +7,7 @@ it, under a name that changes with everything it depends on.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -20,8 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from braidcast.errors import InputError
 from braidcast.vessels.centreline import as_rows
 from braidcast.vessels.centreline_file import ENDINGS as CENTRELINES
-from braidcast.vessels.centreline_file import flipped_lps_ras, read_centreline
-from braidcast.vessels.centreline_search import find_centreline
 from braidcast.vessels.distance_grid import DistanceGrid
 from braidcast.vessels.extension import extended
 from braidcast.vessels.grid_spacing import EXTENSION, usual_spacing
@@ -30,8 +27,10 @@ from braidcast.vessels.kept_arrays import keep, read_kept
 from braidcast.vessels.lumen_surface import LumenSurface, Opening
 from braidcast.vessels.mesh_distance import MeshDistance
 from braidcast.vessels.polyline import Polyline
+from braidcast.vessels.surface_centreline import centreline_of
 from braidcast.vessels.surface_file import ENDINGS as SURFACES
 from braidcast.vessels.surface_file import read_surface
+from braidcast.vessels.wording import about
 
 if TYPE_CHECKING:
     from braidcast.vessels.sacs import Sac
@@ -39,6 +38,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 """Called with the stage, of ``STAGES``, and the share of it that is done."""
+
+_FARTHEST_END = 1000.0
 
 STAGES = ("surface", "centreline", "distance")
 
@@ -54,6 +55,14 @@ class SurfaceSource:
     spacing: float | None = None
     """Of the grid, mm; chosen from the wire and the vessel if None."""
     wire_radius: float = 0.014
+
+    def __post_init__(self) -> None:
+        for end in self.ends or ():
+            if not all(abs(x) <= _FARTHEST_END for x in end):  # NaN is not either
+                raise InputError(
+                    f"ends = {' and '.join(f'{list(end)}' for end in self.ends or ())} must be two "
+                    f"points of three numbers of mm from -{_FARTHEST_END:g} to {_FARTHEST_END:g}"
+                )
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +103,7 @@ class SurfaceVessel:
 
     @cached_property
     def _wall(self) -> MeshDistance:
-        with _about(f"surface = {self.name}"):
+        with about(f"surface = {self.name}"):
             return MeshDistance(extended(self.surface, EXTENSION))
 
 
@@ -189,13 +198,13 @@ def _made(source: SurfaceSource, report: Progress) -> SurfaceVessel:
     report("surface", 0.0)
     surface = read_surface(source.surface, source.units)
     where = f"surface = {source.surface}"
-    with _about(where):
+    with about(where):
         wall = MeshDistance(extended(surface, EXTENSION))
     report("surface", 1.0)
     report("centreline", 0.0)
-    line, remarks = _centreline(source, surface, wall)
+    line, remarks = centreline_of(source, surface, wall)
     report("centreline", 1.0)
-    with _about(where):
+    with about(where):
         spacing = source.spacing or usual_spacing(surface, source.wire_radius)
         grid = DistanceGrid.of(surface, spacing, partial(report, "distance"))
     report("distance", 1.0)
@@ -206,78 +215,4 @@ def _made(source: SurfaceSource, report: Progress) -> SurfaceVessel:
         grid,
         source.centreline is None,
         (*surface.remarks, *grid.remarks, *remarks),
-    )
-
-
-@contextmanager
-def _about(where: str) -> Iterator[None]:
-    """Put the field and its value before what is said of them."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{where} {error}") from None
-
-
-def _centreline(
-    source: SurfaceSource, surface: LumenSurface, wall: MeshDistance
-) -> tuple[Polyline, list[str]]:
-    """The centreline, given or found, with the lumen's radius along it."""
-    ends = None if source.ends is None else np.array(source.ends)
-    where = f"centreline = {source.centreline}"
-    if source.centreline is None:
-        if ends is None:
-            ends = _farthest_ends(source, surface)
-        bounds = np.array([surface.vertices.min(axis=0), surface.vertices.max(axis=0)])
-        return find_centreline(wall.distance, bounds, ends, _end_radii(surface, ends)), []
-    given = read_centreline(source.centreline, ends)
-    with _about(f"{where}:"):
-        line = Polyline.through(given.points, given.radii)
-    inside = _share_inside(line, wall)
-    if inside < 0.9:
-        turned = Polyline.through(flipped_lps_ras(given.points))
-        guess = (
-            ": it would lie inside with x and y negated, the other of RAS and LPS coordinates"
-            if _share_inside(turned, wall) > 0.9
-            else ""
-        )
-        raise InputError(
-            f"{where} lies within the surface for {inside:.0%} of its "
-            f"length, must for 90 % at least{guess}"
-        )
-    return line if line.radii is not None else _with_depths(line, wall), list(given.remarks)
-
-
-def _end_radii(surface: LumenSurface, ends: Array) -> Array | None:
-    """Radii (2,) of the openings at the ends; None unless each end lies in one."""
-    radii = []
-    for end in ends:
-        here = [o.radius for o in surface.openings if np.linalg.norm(end - o.centre) < o.radius]
-        radii += here[:1]
-    return np.array(radii) if len(radii) == 2 else None
-
-
-def _share_inside(line: Polyline, wall: MeshDistance) -> float:
-    places = line.at_arc_length(np.linspace(0.0, line.length, 200))
-    return float((wall.distance(places) < 0.0).mean())
-
-
-def _with_depths(line: Polyline, wall: MeshDistance) -> Polyline:
-    """A line without radii, given those of the largest spheres about it."""
-    along = np.linspace(0.0, line.length, max(8, int(line.length / 0.25)))
-    places = line.at_arc_length(along)
-    return Polyline.through(places, np.maximum(-wall.distance(places), 1e-3))
-
-
-def _farthest_ends(source: SurfaceSource, surface: LumenSurface) -> Array:
-    """Centres (2, 3) of the two openings, the wider one first."""
-    openings: list[Opening] = sorted(surface.openings, key=lambda o: -o.radius)
-    if len(openings) == 2:
-        return np.array([opening.centre for opening in openings])
-    places = ", ".join(
-        f"({', '.join(f'{x:.1f}' for x in o.centre)}) of radius {o.radius:.2f}" for o in openings
-    )
-    found = f"has {len(openings)} open ends: {places} mm" if openings else "has no open end"
-    raise InputError(
-        f"surface = {source.surface} {found}; ends = [[x, y, z], [x, y, z]] must say between which "
-        "two places the centreline runs, from proximal to distal"
     )

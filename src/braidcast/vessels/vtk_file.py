@@ -27,21 +27,13 @@ ENDINGS = (".vtp", ".vtk")
 _PATIENCE_SECONDS = 300.0
 
 
-def read_vtk_surface(
-    path: str | os.PathLike[str], field: str = "surface"
-) -> tuple[Array, NDArray[np.int64]]:
-    """Vertices (n, 3) and triangles (m, 3) of a file's polygons, as they stand there.
-
-    ``InputError``, which names ``field``, if VTK is not installed or the file cannot be used.
-    """
-    vertices, triangles, _ = read_vtk_polygons(path, field)
-    return vertices, triangles
-
-
 def read_vtk_polygons(
     path: str | os.PathLike[str], field: str = "surface"
 ) -> tuple[Array, NDArray[np.int64], int]:
-    """As ``read_vtk_surface``, and how many polygons the triangles were made of."""
+    """Vertices (n, 3) and triangles (m, 3) as they stand in a file, and of how many polygons.
+
+    ``InputError``, which names ``field``, if VTK is not installed or the file cannot be used.
+    """
     arrays = _read(path, "surface", field)
     return arrays["points"], arrays["triangles"], int(arrays["polygons"])
 

@@ -1,9 +1,14 @@
-"""Counts and places in the sentences about a surface."""
+"""Counts, places and beginnings of the sentences about a surface."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from numpy.typing import NDArray
+
+from braidcast.errors import InputError
 
 
 def place(point: NDArray[np.float64]) -> str:
@@ -18,3 +23,12 @@ def counted(number: int, one: str, more: str = "") -> str:
 
 def was(number: int) -> str:
     return "was" if number == 1 else "were"
+
+
+@contextmanager
+def about(where: str) -> Iterator[None]:
+    """Put the field and its value before what is said of them."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where} {error}") from None

@@ -1,0 +1,112 @@
+/** A number's slider and typed value; and the site's, which is also a length along the centreline. */
+
+import { element, write } from "./elements.js";
+import { parse, shown } from "./numbers.js";
+
+/** One number: a slider over [low, high], a field that takes any number a case file may hold. */
+export class NumberControl {
+  /** `onChange(value, committed)`; committed is false while a slider is dragged. */
+  constructor(field, [low, high], onChange) {
+    this.field = field;
+    this.limits = [low, high];
+    const id = `number-${field.name}`;
+    const step = high - low <= 2 ? 0.001 : 0.01;
+    const unit = field.unit ? ` (${field.unit})` : "";
+    this.slider = element("input", { type: "range", min: low, max: high, step, "aria-label": `${field.label}${unit}, slider` });
+    this.typed = element("input", { type: "text", id, inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-describedby": `${id}-note` });
+    this.note = element("p", { class: "note", id: `${id}-note`, role: "status" });
+    const emit = (committed) => {
+      this.#complain("");
+      onChange(Number(this.slider.value), committed);
+    };
+    this.slider.addEventListener("input", () => emit(false));
+    this.slider.addEventListener("change", () => emit(true));
+    this.typed.addEventListener("change", () => {
+      const { value, complaint } = parse(this.typed.value, field);
+      if (complaint) this.typed.value = shown(this.value);
+      this.#complain(complaint ? `${complaint} Kept ${shown(this.value)}${field.unit && ` ${field.unit}`}.` : "");
+      if (!complaint) onChange(value, true);
+    });
+    this.root = element("div", { class: "control" },
+      element("label", { for: id, text: field.label }), this.slider, this.typed,
+      element("span", { class: "unit", text: field.unit }), this.note);
+  }
+
+  show(value) {
+    this.value = value;
+    const [low, high] = this.limits;
+    if (Number(this.slider.value) !== value) this.slider.value = value;
+    if (document.activeElement !== this.typed || parse(this.typed.value, this.field).value !== value) this.typed.value = shown(value);
+    const outside = value < low - 1e-9 || value > high + 1e-9;
+    this.root.classList.toggle("outside", outside);
+    if (!this.complaint) write(this.note, outside ? `Trained from ${low} to ${high}${this.field.unit && ` ${this.field.unit}`}.` : "");
+  }
+
+  #complain(text) {
+    this.complaint = text;
+    this.typed.setAttribute("aria-invalid", Boolean(text));
+    write(this.note, text);
+  }
+}
+
+/** The site: a slider as wide as the strip above it, η and the proximal end in mm, linked. */
+export class SiteControl {
+  /** `hasEta`: false for a vessel from a surface, whose sites are known by their mm alone. */
+  constructor(field, hasEta, onChange) {
+    this.spare = 1;
+    this.eta = 0;
+    this.slider = element("input", { type: "range", min: 0, max: 1, step: 0.001, "aria-label": "Site along the vessel, slider" });
+    this.note = element("p", { class: "note", id: "site-note", role: "status" });
+    this.typed = this.#typed("number-site_eta");
+    this.millimetres = this.#typed("number-site_mm");
+    this.ends = element("span", { id: "site-ends" });
+    this.slider.addEventListener("input", () => this.#emit(Number(this.slider.value), false, onChange));
+    this.slider.addEventListener("change", () => this.#emit(Number(this.slider.value), true, onChange));
+    this.typed.addEventListener("change", () => {
+      const { value, complaint } = parse(this.typed.value, field);
+      if (complaint) this.#refuse(`${complaint} Kept η ${shown(this.eta)}.`);
+      else this.#emit(value, true, onChange);
+    });
+    this.millimetres.addEventListener("change", () => {
+      const rule = `from 0 to ${this.spare.toFixed(2)} mm`;
+      const { value, complaint } = parse(this.millimetres.value, { label: "Proximal end", low: 0, high: this.spare + 0.005, rule });
+      if (complaint) this.#refuse(`${complaint} Kept ${(this.eta * this.spare).toFixed(2)} mm.`);
+      else this.#emit(Math.min(1, value / this.spare), true, onChange);
+    });
+    const eta = [element("label", { for: "number-site_eta", text: "Site η" }), this.typed];
+    this.root = element("div", { class: "site-control" }, this.slider,
+      element("div", { class: "site-values" }, ...(hasEta ? eta : []),
+        element("label", { for: "number-site_mm", text: "Proximal end at" }), this.millimetres,
+        element("span", { class: "unit", text: "mm" }), this.ends), this.note);
+  }
+
+  /** `geometry`: {length, crimpedLength, spareLength}, mm. */
+  show(eta, { length, crimpedLength, spareLength }) {
+    this.eta = eta;
+    this.spare = spareLength;
+    if (Number(this.slider.value) !== eta) this.slider.value = eta;
+    this.#display();
+    const start = eta * spareLength;
+    this.slider.setAttribute("aria-valuetext", `η ${eta.toFixed(3)}, proximal end at ${start.toFixed(2)} mm`);
+    write(this.ends, `crimped to ${(start + crimpedLength).toFixed(2)} mm of the centreline's ${length.toFixed(2)} mm`);
+  }
+
+  #typed(id) {
+    return element("input", { type: "text", id, inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-describedby": "site-note" });
+  }
+
+  #display() {
+    this.typed.value = shown(this.eta);
+    this.millimetres.value = (this.eta * this.spare).toFixed(2);
+  }
+
+  #emit(eta, committed, onChange) {
+    write(this.note, "");
+    onChange(eta, committed);
+  }
+
+  #refuse(text) {
+    write(this.note, text);
+    this.#display();
+  }
+}
