@@ -1,6 +1,7 @@
 """Vessels from files: what is refused, in which words, and what is kept on the disk."""
 
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def line(radius=1.5, stop=10.0):
     return "line.csv"
 
 
-def refused(given, start, match=""):
+def refused(given, start, match=None):
     with pytest.raises(InputError, match=match) as raised:
         load_vessel(given)
     assert str(raised.value).startswith(start)
@@ -95,10 +96,9 @@ def test_what_is_kept_is_the_same_and_damage_is_made_anew(straight, monkeypatch)
     given, points = source(straight, centreline=line()), [[0.0, 0.3, 4.0], [1.0, 1.0, 7.0]]
     made = load_vessel(given)
     (kept,) = [name for name in os.listdir() if name.endswith(".npz")]
-    whole = open(kept, "rb").read()
+    whole = Path(kept).read_bytes()
     for content in (whole, whole[: len(whole) // 2], b"", whole[:2000] + b"\0" * 99 + whole[2099:]):
-        with open(kept, "wb") as file:
-            file.write(content)
+        Path(kept).write_bytes(content)
         surface_vessel._loaded.clear()
         again = load_vessel(given)
         assert_array_equal(again.grid.distance(points), made.grid.distance(points))

@@ -39,9 +39,7 @@ def planner(
     ] = None,
     port: Annotated[
         int | None,
-        typer.Option(
-            "--port", min=1, max=65535, metavar="N", help="Default: 8765, or a free one."
-        ),
+        typer.Option("--port", min=1, max=65535, metavar="N", help="Default: 8765, or a free one."),
     ] = None,
     host: Annotated[
         str,
@@ -76,8 +74,9 @@ def planner(
 def _serve(
     case: Path | None, model: Path | None, port: int | None, host: str, browser: bool
 ) -> None:
-    from braidcast.planner.serve import listening, serve, url
+    from braidcast.planner.serve import check_installed, listening, serve, url
 
+    check_installed()
     # The address comes first: if it cannot be had, nobody waits to hear it.
     with listening(host, port) as opened:
         contents = _contents(case, model)
@@ -105,7 +104,7 @@ def _contents(case: Path | None, model: Path | None) -> Contents:
             opened = OpenedCase.from_toml(case, progress)
     contents = Contents(opened, partial(_load, model))
     if model is not None:
-        _ = contents.without_model
+        _ = contents.model
     return contents
 
 

@@ -13,11 +13,13 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from braidcast.devices import catalogue
 from braidcast.errors import InputError
 from braidcast.surrogate.model import SurrogateModel
 
@@ -68,7 +70,8 @@ def model_bytes(model: SurrogateModel) -> bytes:
         "name": str(model.record["name"]),
         "case": model.case.to_dict(),
         "device": dict(model.applicability.device),
-        "limits": {name: list(ends) for name, ends in model.applicability.limits.items()},
+        "catalogue": {name: asdict(braid) for name, braid in catalogue.items()},
+        "limits": {name: list(limits) for name, limits in model.applicability.limits.items()},
         "threshold": model.threshold,
         "interval_factor": model.interval_factor,
         "ends_intercept": ends.intercept_,

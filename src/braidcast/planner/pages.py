@@ -1,7 +1,7 @@
 """The page as the server sends it, and as one file that needs no server.
 
-Everything in ``static/`` is plain: index.html names a style sheet, an import map and modules, the
-modules import each other by ``"./name.js"`` and by the names of the import map. In the single
+Everything in ``static/`` is plain: index.html names a style sheet, an import map and a module
+by ``"./name"``; modules import each other by ``"./name.js"`` and by the names of the import map. In the single
 file each module is a data: URL of a larger import map, under a name of its own, because a relative
 name leads nowhere from such a URL; nothing else in a module is changed.
 """
@@ -56,9 +56,9 @@ def policy(page: str) -> str:
 def single_file(contents: Contents, static: Path = STATIC) -> str:
     """The whole planner in one HTML file.
 
-    Beside the page it has two elements, from which the page knows that there is no server:
-    ``<script type="application/json" id="planner-start">``, what ``/api/start`` answers, and
-    ``<script type="text/plain" id="planner-model">``, the model's arrays, gzip in base64.
+    It has an element more, from which the page knows that there is no server:
+    ``<script type="application/json" id="embedded">`` with ``start``, what ``/api/start`` answers,
+    and ``model``, the model's arrays, gzip in base64, or null.
     """
     names = sorted(
         path.relative_to(static).as_posix() for path in static.rglob("*") if path.is_file()
@@ -81,13 +81,17 @@ def single_file(contents: Contents, static: Path = STATIC) -> str:
     page = _only(_MODULE, page, module)
     page = _outside_scripts(page, lambda text: _RESOURCE.sub(resource, text))
     model = contents.model
-    packed = "" if model is None else base64.b64encode(model.gzipped).decode()
-    data = (
+    embedded = {
+        "start": json.loads(contents.start.plain),
+        "model": None if model is None else base64.b64encode(model.gzipped).decode(),
+    }
+    added = (
         f'<meta http-equiv="Content-Security-Policy" content="{_FILE_POLICY}">\n'
-        + _script("application/json", json.loads(contents.start.plain), "planner-start")
-        + f'\n<script type="text/plain" id="planner-model">{packed}</script>\n'
+        f"{_script('application/json', embedded, 'embedded')}\n"
     )
-    return _only(re.compile(r"(<head\b[^>]*>\s*<meta charset=[^>]*>)"), page, lambda m: m[0] + data)
+    return _only(
+        re.compile(r"(<head\b[^>]*>\s*<meta charset=[^>]*>)"), page, lambda m: m[0] + added
+    )
 
 
 def _imports(page: str, static: Path, names: list[str]) -> dict[str, str]:
@@ -119,8 +123,8 @@ def _module_url(static: Path, name: str, modules: list[str]) -> str:
 
 
 def _name(reference: str) -> str:
-    """What a reference in index.html is called inside static/."""
-    return reference.removeprefix("./").removeprefix("/").removeprefix("static/")
+    """What "./name" in index.html is called."""
+    return reference.removeprefix("./")
 
 
 def _data_url(path: Path) -> str:

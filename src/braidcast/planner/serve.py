@@ -6,6 +6,7 @@ import errno
 import os
 import socket
 from contextlib import suppress
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from braidcast.errors import InputError
@@ -15,6 +16,16 @@ if TYPE_CHECKING:
 
 LOOPBACK = "127.0.0.1"
 USUAL_PORT = 8765
+
+
+def check_installed() -> None:
+    """``InputError`` without the packages that serve the page."""
+    missing = [name for name in ("starlette", "uvicorn") if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"{' and '.join(missing)} must be installed for the planner: "
+            "pip install 'braidcast[planner]'"
+        )
 
 
 def listening(host: str, port: int | None) -> socket.socket:

@@ -53,7 +53,7 @@ def application(
     static: Path = STATIC,
 ) -> Starlette:
     """The server of a planner. ``any_host``: whatever name the browser knows it by."""
-    page = (static / "index.html").read_text("utf-8")
+    page = (static / "index.html").read_text("utf-8").replace('"./', '"./static/')
     api = _Api(contents, Jobs(simulate))
     return Starlette(
         routes=[

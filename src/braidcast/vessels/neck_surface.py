@@ -10,7 +10,7 @@ from braidcast.vessels.parametric import SaccularVessel
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-EDGES = 4.0
+EDGES = 3.0
 """So many edges lie across the fillet's width."""
 
 
@@ -41,7 +41,7 @@ def rounded_neck(
     off = np.abs(vessel.distance(vertices))
     near = (off > 1e-12) & (off < 0.5 * vessel.neck_fillet)
     # Short steps follow the lines of the gradient, which do not cross; the last ones are Newton's.
-    for share in (0.15,) * 25 + (1.0,) * 4:
+    for share in (0.25,) * 12 + (1.0,) * 3:
         distance, gradient, _ = vessel.evaluate(vertices[near])
         square = np.einsum("ni,ni->n", gradient, gradient)
         vertices[near] -= (share * distance / square)[:, None] * gradient

@@ -1,13 +1,13 @@
 /** The page's state in the address: what is after the # is all that a reload needs. */
 
-import { NUMBERS, changed, parse, read, shown } from "./numbers.js";
+import { changed, parse, read, shown } from "./numbers.js";
 
 const COLOURS = ["gap", "std", "departure"];
 const COMPARISONS = ["off", "sides", "ghost"];
 const PAUSE = 250; // ms; browsers refuse hundreds of history entries in a few seconds
 
-/** State → text: {tables, pinned, colour, compare}; numbers by the model's names, A's with "A.". */
-export function toHash(state, numbers = NUMBERS) {
+/** State {tables, pinned, colour, compare} → text; `numbers`: the fields that may change, A's with "A.". */
+export function toHash(state, numbers) {
   const parts = new URLSearchParams();
   for (const [prefix, tables] of [["", state.tables], ["A.", state.pinned]]) {
     for (const field of tables ? numbers : []) {
@@ -21,7 +21,7 @@ export function toHash(state, numbers = NUMBERS) {
 }
 
 /** Text → {state, complaints}: what is nonsense keeps the value of `start` and is complained of. */
-export function fromHash(hash, start, numbers = NUMBERS) {
+export function fromHash(hash, start, numbers) {
   const complaints = [];
   const state = { ...start, pinned: null, colour: "gap", compare: "off" };
   const parts = new URLSearchParams(hash.replace(/^#/, ""));

@@ -1,5 +1,7 @@
 /** Where things are along the centreline: the neck's edges, the ends of the braid; all in mm. */
 
+import { dot } from "./bezier.js";
+
 const POINTS = 400;
 
 /** A centreline as closely spaced points with their arc lengths. */
@@ -58,15 +60,3 @@ export class Along {
     return [edge(first - 1, first), edge(last + 1, last)];
   }
 }
-
-/** Middle (x, y, z) of ring `ring` of a braid, positions 3N. */
-export function ringCentre(positions, ring, device) {
-  const centre = [0, 0, 0];
-  for (let wire = 0; wire < device.wires; wire++) {
-    const node = 3 * (wire * (device.segments + 1) + ring);
-    for (let k = 0; k < 3; k++) centre[k] += positions[node + k] / device.wires;
-  }
-  return centre;
-}
-
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -12,9 +12,10 @@ import { float, general } from "./number_text.js";
 /** Length of vessel, mm, that the crimped device leaves free at the least. */
 const MARGIN = 0.5;
 
-const CATALOGUE = "paper";
-
 const START = [0, 0, 0], END = [0, 0, 50], NECK_FILLET = 0.2, FRICTION = 0.1;
+
+/** Keys of the device whose values are whole numbers. */
+const WHOLE = ["wires", "segments"];
 
 const POINT = "three numbers of mm, each from -1000 to 1000";
 const ofMm = (most) => `a number of mm above 0, at most ${most}`;
@@ -168,14 +169,23 @@ function saccular({ vessel, aneurysm }, g) {
     + `more than ${general(radius + sac, 4)} mm, or the sac swallows that end`;
 }
 
+/** The device of a case: one of the catalogue's, by name, with the values that the case replaces. */
+export function deviceOf(case_, catalogue) {
+  const { name = "paper", ...replaced } = case_.device ?? {};
+  const given = Object.entries(replaced).filter(([, value]) => value != null);
+  return { ...catalogue[name], ...Object.fromEntries(given) };
+}
+
 /** Why a model of ``device`` cannot answer the case, as a sentence, or null. */
-export function otherDevice(case_, device) {
-  for (const [name, value] of Object.entries(case_.device ?? {})) {
-    if (name === "name" ? value !== CATALOGUE : value != null && value !== device[name]) {
-      const known = name === "name" ? CATALOGUE : device[name];
-      return `device.${name} = ${value} must be ${known}, that of the device the model was trained `
-        + "for";
-    }
+export function otherDevice(case_, device, catalogue) {
+  const text = (name, value) => {
+    if (typeof value === "boolean") return value ? "True" : "False";
+    return WHOLE.includes(name) ? value : float(value);
+  };
+  for (const [name, value] of Object.entries(deviceOf(case_, catalogue))) {
+    if (value === device[name]) continue;
+    return `device.${name} = ${text(name, value)} must be ${text(name, device[name])}, that of the `
+      + "device the model was trained for";
   }
   return null;
 }
@@ -200,8 +210,6 @@ export function fields(case_, device, g = geometry(case_, device)) {
     wall_friction: wall?.friction ?? FRICTION,
   };
 }
-
-const WHOLE = ["wires", "segments"];
 
 /** The text of a case file that ``Case.from_toml`` reads back as the same case. */
 export function toToml(case_) {

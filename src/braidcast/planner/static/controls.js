@@ -3,12 +3,12 @@
 import { element, write } from "./elements.js";
 import { parse, shown } from "./numbers.js";
 
-/** One number: a slider over [low, high], a field that takes any number a case file may hold. */
+/** One number: a slider over its range, a field that takes any number a case file may hold. */
 export class NumberControl {
   /** `onChange(value, committed)`; committed is false while a slider is dragged. */
-  constructor(field, [low, high], onChange) {
+  constructor(field, onChange) {
     this.field = field;
-    this.limits = [low, high];
+    const [low, high] = field.range;
     const id = `number-${field.name}`;
     const step = high - low <= 2 ? 0.001 : 0.01;
     const unit = field.unit ? ` (${field.unit})` : "";
@@ -34,10 +34,10 @@ export class NumberControl {
 
   show(value) {
     this.value = value;
-    const [low, high] = this.limits;
+    const [low, high] = this.field.range;
     if (Number(this.slider.value) !== value) this.slider.value = value;
     if (document.activeElement !== this.typed || parse(this.typed.value, this.field).value !== value) this.typed.value = shown(value);
-    const outside = value < low - 1e-9 || value > high + 1e-9;
+    const outside = this.field.trained && (value < low - 1e-9 || value > high + 1e-9);
     this.root.classList.toggle("outside", outside);
     if (!this.complaint) write(this.note, outside ? `Trained from ${low} to ${high}${this.field.unit && ` ${this.field.unit}`}.` : "");
   }

@@ -1,26 +1,17 @@
 /** What the page talks to: the planner's server, or the file that the page itself is. */
 
+import { unpack } from "./model.js";
+
 const POLL = 300; // ms between looks at a running simulation
 const HEARTBEAT = 2000; // ms between looks whether the server is there
+
+/** Why a file cannot simulate. */
+export const NO_SERVER = "This page is a file without a server, so it cannot simulate: open the case with “braidcast planner CASE.toml”.";
 
 /** Aborts are the user's wish and no fault to complain of. */
 export class Cancelled extends Error {}
 
 const pause = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
-
-/** A container of model_arrays.py: {header, arrays by name}. */
-export function unpack(buffer) {
-  const length = new DataView(buffer).getUint32(8, true);
-  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 12, length)));
-  let offset = Math.ceil((12 + length) / 8) * 8;
-  const arrays = {};
-  for (const [name, shape] of Object.entries(header.arrays)) {
-    const size = shape.reduce((a, b) => a * b, 1);
-    arrays[name] = new Float64Array(buffer, offset, size);
-    offset += 8 * size;
-  }
-  return { header, arrays };
-}
 
 export class ServerHost {
   kind = "server";
@@ -118,27 +109,30 @@ export class ServerHost {
   }
 }
 
-/** The exported page: `embedded` holds what the server would say and the model, gzipped, in base64. */
+/** The exported page: its first answers and its model, gzipped in base64, are elements of it. */
 export class FileHost {
   kind = "file";
-  #embedded;
+  #start;
+  #packed;
 
-  constructor(embedded) {
-    this.#embedded = embedded;
+  /** `start`: the element with JSON; `model`: that with base64, empty without a model. */
+  constructor(start, model) {
+    this.#start = JSON.parse(start.textContent);
+    this.#packed = model.textContent;
   }
 
   async start() {
-    return this.#embedded.start;
+    return this.#start;
   }
 
   async model() {
-    if (!this.#embedded.model) return null;
-    const packed = Uint8Array.from(atob(this.#embedded.model), (letter) => letter.charCodeAt(0));
-    return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+    if (!this.#packed) return null;
+    const bytes = Uint8Array.from(atob(this.#packed), (letter) => letter.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   }
 
   async simulate() {
-    throw new Error("This page is a file without a server, so it cannot simulate: open the case with “braidcast planner CASE.toml”.");
+    throw new Error(NO_SERVER);
   }
 
   resume() {

@@ -1,7 +1,7 @@
 // The surrogate in the browser, with the numbers of surrogate/model.py.
 
 import { braidLength, nodeCount } from "./braid.js";
-import { fields, geometry, otherDevice } from "./case.js";
+import { complaint, fields, geometry, otherDevice } from "./case.js";
 import { GaussianProcesses } from "./gaussian_processes.js";
 import { general } from "./number_text.js";
 import { PlacedBraid } from "./placed_braid.js";
@@ -59,15 +59,22 @@ export class Model {
     return (this.stdReady ??= this.#processes.prepare(progress));
   }
 
-  /** Probability that the deployment succeeds. */
+  /** Why the model cannot answer a case, as a sentence, or null. */
+  complaint(case_) {
+    if (!case_.aneurysm) return "aneurysm is missing; the surrogate needs one, with a diameter";
+    const other = otherDevice(case_, this.device, this.header.catalogue);
+    return other ?? complaint(case_, this.device);
+  }
+
+  /** Probability that the deployment succeeds; throws the ``complaint``. */
   successProbability(case_) {
     const g = this.#geometry(case_);
     return this.#success(predictors(g, this.#placed.place(g, true)).ends);
   }
 
-  /** The deployed stent, of a case without a ``complaint``: {positions (3 N) mm, std (3 N) mm and
-  stdNorm (N) mm or null, gaps (N) mm, successProbability, success, deployedLength mm,
-  foreshorteningPercent, inRange, outOfRange [phrases], nearestCase, nearestDistance}. */
+  /** The deployed stent, {positions (3 N) mm, std (3 N) mm and stdNorm (N) mm or null, gaps (N)
+  mm, successProbability, success, deployedLength mm, foreshorteningPercent, inRange, outOfRange
+  [phrases], nearestCase, nearestDistance}; throws the ``complaint``. */
   predict(case_) {
     const g = this.#geometry(case_);
     const { site, ends } = predictors(g, this.#placed.place(g));
@@ -96,11 +103,8 @@ export class Model {
   }
 
   #geometry(case_) {
-    const other = otherDevice(case_, this.device);
-    if (other) throw new Error(other);
-    if (!case_.aneurysm) {
-      throw new Error("aneurysm is missing; the surrogate needs one, with a diameter");
-    }
+    const reason = this.complaint(case_);
+    if (reason) throw new Error(reason);
     return geometry(case_, this.device);
   }
 

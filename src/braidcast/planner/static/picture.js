@@ -36,11 +36,11 @@ export class Picture {
   }
 }
 
-/** How nodes get their colour: {values, range, palette, title}; values (N) mm. */
+/** How nodes get their colour: {kind, values, range, palette, title}; values (N) mm. */
 export function colouring(kind, { gaps, stdNorm, departure }) {
-  if (kind === "departure" && departure) return { values: departure, range: [0, ceiling(departure)], palette: "cividis", title: "departure from the simulation, mm" };
-  if (kind === "std" && stdNorm) return { values: stdNorm, range: [0, ceiling(stdNorm)], palette: "cividis", title: "standard deviation, mm" };
-  return { values: gaps, range: [0, FARTHEST], palette: "viridis", title: "distance to the wall, mm" };
+  if (kind === "departure" && departure) return { kind, values: departure, range: [0, ceiling(departure)], palette: "cividis", title: "departure from the simulation, mm" };
+  if (kind === "std" && stdNorm) return { kind, values: stdNorm, range: [0, ceiling(stdNorm)], palette: "cividis", title: "standard deviation, mm" };
+  return { kind: "gap", values: gaps, range: [0, FARTHEST], palette: "viridis", title: "distance to the wall, mm" };
 }
 
 /** The next of 1, 2, 5, 10 … × 10^k above all values, so that the scale does not change at every move. */

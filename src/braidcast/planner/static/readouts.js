@@ -1,14 +1,15 @@
 /** The numbers of a prediction or a simulation as rows of text: [key, what, value]. */
 
 import { element, write } from "./elements.js";
-import { ringCentre } from "./along.js";
+import { ringCentres } from "./braid.js";
 import { measure } from "./numbers.js";
 
 export const percent = (share) => `${(100 * share).toFixed(1)} %`;
 
 /** Arc lengths, mm, of the two ends of a deployed braid. */
 function ends(positions, along, device) {
-  return [0, device.segments].map((ring) => along.closest(ringCentre(positions, ring, device)));
+  const centres = ringCentres(device, positions);
+  return [centres.slice(0, 3), centres.slice(-3)].map((centre) => along.closest([...centre]));
 }
 
 /** How far the ends reach beyond the neck's edges, along the centreline. */

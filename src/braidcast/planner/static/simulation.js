@@ -1,7 +1,7 @@
 /** “Simulate this case”: progress, cancelling, and the results of this visit, each with its case. */
 
 import { element, write } from "./elements.js";
-import { Cancelled } from "./host.js";
+import { Cancelled, NO_SERVER } from "./host.js";
 import { showRows } from "./readouts.js";
 
 const KEPT = 10; // results in memory; a braid and its gaps are 0.1 MB
@@ -47,7 +47,7 @@ export class SimulationBox {
     const other = this.#other(key);
     this.other.hidden = this.go.hidden = !other;
     write(this.other, this.#running ? "This simulation is of another case than the one shown." : "There is a simulation of another case.");
-    write(this.message, inFile ? "This page is a file without a server, so it cannot simulate: open the case with “braidcast planner CASE.toml”." : this.#message);
+    write(this.message, inFile ? NO_SERVER : this.#message);
     showRows(this.rows, rows);
   }
 
@@ -80,7 +80,7 @@ export class SimulationBox {
   #progress({ state, position, stage, fraction }) {
     if (fraction > 0) this.bar.value = fraction;
     else this.bar.removeAttribute("value");
-    const ahead = position > 0 ? `waiting, place ${position} in the queue` : "waiting";
+    const ahead = position > 0 ? `waiting for ${position} other${position > 1 ? "s" : ""}` : "starting";
     write(this.stage, state === "queued" ? ahead : `${stage ?? "starting"}${fraction > 0 ? `, ${Math.round(100 * fraction)} %` : ""}`);
     if (state === "queued" || !this.progress.dataset.shown) this.onChange();
     this.progress.dataset.shown = this.#running ? "yes" : "";

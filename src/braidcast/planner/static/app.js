@@ -1,0 +1,275 @@
+/** The page: one state, looked at once a frame, shown everywhere. */
+
+import { History, fromHash, toHash } from "./address.js";
+import { Banners } from "./banners.js";
+import { CompareBox } from "./compare.js";
+import { NumberControl, SiteControl } from "./controls.js";
+import { downloads } from "./downloads.js";
+import { element, find, write } from "./elements.js";
+import { files } from "./files.js";
+import { FileHost, ServerHost } from "./host.js";
+import { legend } from "./legend.js";
+import { Model } from "./model.js";
+import { changed, shownNumbers } from "./numbers.js";
+import { Picture, colouring } from "./picture.js";
+import { percent, showRows } from "./readouts.js";
+import { SimulationBox, keyOf } from "./simulation.js";
+import { Looker } from "./situation.js";
+import { ETAS, Strip, bestSite } from "./strip.js";
+import { theme } from "./theme.js";
+import { palette } from "./wires.js";
+
+const VIEW_KEYS = { 1: "front", 2: "back", 3: "side", 4: "top", 5: "along", 0: "reset" };
+
+const embedded = find("planner-start");
+const host = embedded ? new FileHost(embedded, find("planner-model")) : new ServerHost();
+const banners = new Banners(find("banners"));
+
+class Planner {
+  #scheduled = false;
+  stdReady = false;
+  seen = null; // the last possible case that was looked at
+  #pinned = { key: "", look: null };
+  #stripKey = "";
+
+  constructor(start, model) {
+    Object.assign(this, { start, model });
+    this.fields = shownNumbers(start.case, model?.limits);
+    this.initial = { tables: start.case, pinned: null, colour: "gap", compare: "off" };
+    this.dark = theme(find("theme"), (dark) => this.setDark(dark));
+    this.pictures = [new Picture(find("canvas"), this.dark)];
+    this.looker = new Looker(start, model, (tables) => this.simulation.of(tables));
+    this.#build();
+    this.readAddress();
+    this.history = new History(() => toHash(this.state, this.fields), () => this.readAddress());
+    addEventListener("resize", () => this.pictures.forEach(({ view }) => view.resize()));
+  }
+
+  /** Changes the state and shows it with the next frame; committed changes go into the history. */
+  change(patch, committed = true) {
+    Object.assign(this.state, patch);
+    if (committed) this.history.commit();
+    this.schedule();
+  }
+
+  readAddress() {
+    const { state, complaints } = fromHash(location.hash, this.initial, this.fields);
+    if (state.pinned && this.looker.look(state.pinned).impossible) {
+      complaints.push("The pinned case A is impossible.");
+      Object.assign(state, { pinned: null, compare: "off" });
+    }
+    this.state = state;
+    banners.set("address", "note", complaints.length ? `The address holds something else than a case: ${complaints[0]} The rest of it is used.` : "");
+    this.schedule();
+  }
+
+  schedule() {
+    if (this.#scheduled) return;
+    this.#scheduled = true;
+    requestAnimationFrame(() => {
+      this.#scheduled = false;
+      const before = performance.now();
+      this.#show();
+      performance.measure("planner-move", { start: before });
+      performance.clearMeasures("planner-move"); // who observes has it; kept it would grow for ever
+    });
+  }
+
+  setDark(dark) {
+    this.pictures?.forEach(({ view }) => view.setDark(dark));
+  }
+
+  #build() {
+    const number = (field) => (value, committed) => this.change({ tables: changed(this.state.tables, field, value) }, committed);
+    const [site, ...others] = this.fields;
+    this.siteControl = new SiteControl(site, !this.start.surface, number(site));
+    find("site-controls").append(this.siteControl.root);
+    this.controls = others.map((field) => new NumberControl(field, number(field)));
+    find("controls").append(...this.controls.map(({ root }) => root));
+    if (this.start.surface) find("controls").append(element("p", { class: "note", text: `Vessel from the surface ${this.start.surface.name}: its shape is what it is, the site may be moved.` }));
+    this.#buildStrip(site, number(site));
+    this.simulation = new SimulationBox(find("simulation"), host, {
+      current: () => this.state.tables,
+      onChange: () => this.schedule(),
+      onGo: (tables) => this.change({ tables }),
+    });
+    this.compare = new CompareBox(find("compare"), {
+      onPin: () => this.change({ pinned: structuredClone(this.state.tables), compare: this.state.compare === "ghost" ? "ghost" : "sides" }),
+      onUnpin: () => this.change({ pinned: null, compare: "off" }),
+      onSwap: () => this.change({ pinned: this.state.tables, tables: this.state.pinned }),
+      onArrange: (compare) => this.change({ compare }),
+    });
+    find("colour").addEventListener("change", ({ target }) => this.change({ colour: target.value }));
+    const turn = (name) => this.pictures.forEach(({ view }) => view.view(name));
+    find("standard-views").addEventListener("click", ({ target }) => target.dataset.view && turn(target.dataset.view));
+    find("views").addEventListener("keydown", ({ key }) => VIEW_KEYS[key] && turn(VIEW_KEYS[key]));
+    const name = () => (this.state.tables.title || "case").toLowerCase().replace(/[^a-z0-9]+/g, "_").slice(0, 40);
+    downloads(find("downloads"), name, files(this), (text) => banners.set("download", "note", text));
+    write(find("case-title"), this.start.case.title ?? "");
+    write(find("model-name"), `braidcast ${this.start.version}; model: ${this.start.modelName ?? "none"}`);
+  }
+
+  #buildStrip(site, onChange) {
+    if (!this.model) {
+      find("strip").hidden = find("best").hidden = true;
+      write(find("strip-title"), "Site along the centreline");
+      return;
+    }
+    this.strip = new Strip(find("strip"), this.model.threshold, onChange);
+    find("best").addEventListener("click", () => {
+      const { eta, safe } = bestSite(this.strip.probabilities, this.model.threshold);
+      banners.set("best", "note", safe ? "" : `No site of this vessel reaches ${percent(this.model.threshold)}; this is the most probable one.`);
+      this.change({ tables: changed(this.state.tables, site, eta) });
+    });
+  }
+
+  #show() {
+    const { tables } = this.state;
+    const now = this.looker.look(tables);
+    banners.set("impossible", "error", now.impossible ? `Impossible: ${now.impossible}. The last possible case is shown in grey.` : "");
+    banners.set("outside", "warning", now.prediction && !now.prediction.inRange ? `Outside of what the model was trained for: ${now.prediction.outOfRange.join("; ")}. A hint, not a prediction.` : "");
+    for (const control of this.controls) control.show(control.field.path.reduce((table, key) => table[key], tables));
+    const seen = now.impossible ? this.seen : now;
+    if (seen) this.siteControl.show(tables.site.eta, seen.geometry);
+    find("panel").classList.toggle("stale-readouts", Boolean(now.impossible));
+    this.#showPictures(now, seen);
+    this.#showVerdict(now);
+    if (!now.impossible) showRows(find("readouts"), now.rows);
+    this.simulation.show(tables, now.impossible ?? "", now.simulated ?? []);
+    this.compare.show(this.state.compare, this.#lookA()?.all ?? [], this.#rowsOf(seen));
+    this.#showStrip(now);
+    this.seen = seen;
+  }
+
+  /** Case A as last looked at; its simulation may have come since. */
+  #lookA() {
+    const { pinned } = this.state;
+    if (!pinned) return null;
+    const key = `${keyOf(pinned)} ${Boolean(this.simulation.of(pinned))} ${this.stdReady}`;
+    if (key !== this.#pinned.key) {
+      const look = this.looker.look(pinned);
+      this.#pinned = { key, look: { ...look, all: this.#rowsOf(look) } };
+    }
+    return this.#pinned.look;
+  }
+
+  #rowsOf(look) {
+    if (!look) return [];
+    const { prediction } = look;
+    const site = ["site", "Proximal end of the crimped stent", `${look.geometry.startArcLength.toFixed(2)} mm`];
+    const verdict = prediction ? [["probability", "Probability of success", percent(prediction.successProbability)], ["verdict", "Verdict", prediction.success ? "success" : "failure"]] : [];
+    return [site, ...verdict, ...look.rows.filter(([key]) => key !== "time"), ...look.simulated.filter(([key]) => key !== "sim-time")];
+  }
+
+  /** Rows [key, what, value] of B, what is seen, and of A if one is pinned. */
+  get bothRows() {
+    return { a: this.#lookA()?.all ?? null, b: this.#rowsOf(this.seen) };
+  }
+
+  #showPictures(now, seen) {
+    const sides = this.state.compare === "sides";
+    const a = this.#lookA();
+    this.#arrange(sides);
+    const second = this.state.compare === "ghost" ? a.prediction?.positions ?? a.simulation?.positions : now.prediction && now.simulation?.positions;
+    const names = { ghost: "B in colours; A as the thin second braid", sides: "B" };
+    const caption = names[this.state.compare] ?? (second ? "Prediction in colours; simulation as the thin second braid" : "");
+    write(find("view-b").lastElementChild, caption);
+    this.pictures[0].show(this.#scene(now, second ?? null));
+    if (sides) this.pictures[1].show(this.#scene(a, null));
+    if (!seen?.prediction && !seen?.simulation) return;
+    const colours = this.#colours(seen);
+    legend(find("legend"), colours, palette);
+    const [, std, away] = find("colour").options;
+    std.disabled = !seen.prediction?.stdNorm;
+    away.disabled = !seen.departure;
+    find("colour").value = colours.kind;
+  }
+
+  #scene(look, ghost) {
+    if (look.impossible) return { stale: true };
+    const { shape, prediction, simulation, marks } = look;
+    const positions = prediction?.positions ?? simulation?.positions;
+    const braid = positions ? { positions, wires: this.looker.wires, device: this.looker.device } : null;
+    return { vessel: shape.vessel, braid, colours: braid && this.#colours(look), marks, ghost };
+  }
+
+  #colours({ prediction, simulation, departure }) {
+    return colouring(this.state.colour, { gaps: (prediction ?? simulation).gaps, stdNorm: prediction?.stdNorm, departure });
+  }
+
+  /** One canvas or two; the second is made when it is first needed. */
+  #arrange(sides) {
+    if (find("view-a").hidden === !sides) return;
+    find("view-a").hidden = !sides;
+    write(find("view-a").lastElementChild, "A");
+    find("views").classList.toggle("two", sides);
+    if (sides && !this.pictures[1]) this.pictures.push(new Picture(find("canvas-a"), document.documentElement.dataset.theme === "dark"));
+    this.pictures.forEach(({ view }) => view.resize());
+  }
+
+  #showVerdict({ impossible, prediction, simulation }) {
+    const root = find("verdict");
+    if (impossible) {
+      root.className = "none";
+      write(root, "✕ Impossible case");
+    } else if (!prediction) {
+      root.className = "none";
+      write(root, `${this.start.withoutModel} ${simulation ? "" : "“Simulate this case” shows where the wires end up."}`.trim());
+    } else {
+      const { success, successProbability } = prediction;
+      root.className = success ? "success" : "failure";
+      write(root, `${success ? "✓ Success" : "✕ Failure"}, probability of success ${percent(successProbability)} (called from ${percent(this.model.threshold)} on)`);
+    }
+  }
+
+  /** The strip belongs to the vessel; it is filled after the frame, so that the braid moves first. */
+  #showStrip({ impossible, prediction }) {
+    if (!this.strip) return;
+    this.strip.root.classList.toggle("stale", Boolean(impossible) || !this.strip.probabilities);
+    if (impossible) return;
+    const { tables } = this.state;
+    const key = JSON.stringify([tables.vessel, tables.aneurysm]);
+    if (key !== this.#stripKey) {
+      this.#stripKey = key;
+      find("best").disabled = true;
+      setTimeout(() => {
+        if (key !== this.#stripKey) return; // moved on; its own turn comes
+        const probabilities = ETAS.map((eta) => this.model.successProbability({ ...tables, site: { ...tables.site, eta } }));
+        this.strip.fill(probabilities);
+        this.strip.mark(this.state.tables.site.eta, prediction.successProbability);
+        find("best").disabled = false;
+      });
+    }
+    this.strip.mark(tables.site.eta, prediction.successProbability);
+    write(find("strip-value"), `${percent(prediction.successProbability)} here`);
+  }
+}
+
+const AWAY = {
+  gone: ["error", "The server is gone. The sliders go on working, for the model is in this page; simulations wait. Trying to reach it …"],
+  here: ["", ""],
+  restarted: ["note", "The server was restarted. Your case is kept; simulations that were running are lost."],
+};
+
+async function open() {
+  try {
+    const start = await host.start();
+    const buffer = start.withoutModel || start.surface ? null : await host.model();
+    const planner = new Planner(start, buffer && new Model(buffer));
+    globalThis.planner = planner; // for tests and the curious
+    host.watch((event) => {
+      banners.set("server", ...AWAY[event]);
+      if (event !== "gone") planner.schedule();
+    });
+    find("waiting").hidden = true;
+    await planner.model?.prepareStd();
+    planner.stdReady = true;
+    planner.schedule();
+  } catch (error) {
+    find("waiting").hidden = false;
+    write(find("waiting"), `The planner could not start: ${error.message}`);
+    console.error(error);
+  }
+}
+
+open();
