@@ -279,9 +279,9 @@ def test_results_can_be_written_from_a_thread(deployment: Deployment, tmp_path: 
 def test_a_disk_too_full_for_the_picture_costs_only_the_picture(
     deployment: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(picture.Drawer, "draw", lambda *_: [b"x" * 3_000_000])
+    monkeypatch.setattr(picture.Drawer, "draw", lambda *_: [b"x" * 5_000_000])
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (2_500_000, limits[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4_500_000, limits[1]))
     try:
         written = write_deployment(deployment, tmp_path)
     finally:
