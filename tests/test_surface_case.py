@@ -54,7 +54,9 @@ def tables(parametric: Case, surface: Path) -> dict[str, Any]:
 
 
 def spoilt(tables: dict[str, Any], field: str, value: Any) -> dict[str, Any]:
-    tables, (table, key) = deepcopy(tables), field.split(".")
+    tables, (table, _, key) = deepcopy(tables), field.partition(".")
+    if not key:
+        return tables | {table: value}
     tables[table].pop(key, None)
     if value is not ...:
         tables[table][key] = value
@@ -156,6 +158,9 @@ def test_sites(parametric: Case, tables: dict[str, Any], site: dict, start: floa
         ("vessel.ends", [[0.0, 0.0, 0.0], [90.0, 0.0, 0.0]], "vessel."),
         ("aneurysm.protrusion", 0.5, "both given, must be exactly one"),
         ("aneurysm.centre", [0.0, 50.0, 20.0], "aneurysm.centre = [0.0, 50.0, 20.0] is "),
+        ("aneurysm", {"neck": [0.0, 7.5, 20.0], "neck_radius": 2.0}, "must be from 0.75"),
+        ("aneurysm", {"neck": [0.0, 70.0, 20.0], "neck_radius": 2.0}, "aneurysm.neck = "),
+        ("aneurysm", {"diameter": 80.0, "centre": [0.0, 9.0, 20.0]}, "must be the sac alone"),
         ("device.length", 40.0, "device.length = 40 mm gives a stent of"),
         ("device.radius", 1.2, "in place"),
         ("site.crimped_radius", 1.48, "must leave more than 1.508 mm, the crimped stent and a"),

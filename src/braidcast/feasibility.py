@@ -145,16 +145,23 @@ def _sac_meets_vessel(case: Case, vessel: SurfaceVessel) -> None:
         return
     away, along = vessel.centreline.closest(sac.centre)
     lumen = float(vessel.centreline.lumen_radius(along)[0])
+    least = 0.0
     if isinstance(table, SacRegion) and table.neck is not None:
-        field, most = f"neck = {list(table.neck)}", 2.0 * lumen
+        field, least, most = f"neck = {list(table.neck)}", 0.5 * lumen, 2.0 * lumen
     elif isinstance(table, SacRegion):
         field, most = f"surface = {table.surface}", lumen + sac.radius
     else:
         field, most = f"centre = {sac.centre.tolist()}", lumen + sac.radius
-    if away[0] >= most:
+    if not least <= away[0] < most:
         raise InputError(
-            f"aneurysm.{field} is {away[0]:.4g} mm from the vessel's centreline, must be below "
-            f"{most:.4g} mm, or it is not at this vessel"
+            f"aneurysm.{field} is {away[0]:.4g} mm from the vessel's centreline, must be from "
+            f"{least:.4g} to below {most:.4g} mm, or it is not at this vessel's side"
+        )
+    places = vessel.centreline.at_arc_length(np.arange(0.0, vessel.centreline.length, _STEP))
+    held = float((sac.depth(places) > 0.0).mean())
+    if held > 0.5:
+        raise InputError(
+            f"aneurysm.{field} holds {held:.0%} of the vessel's centreline, must be the sac alone"
         )
 
 

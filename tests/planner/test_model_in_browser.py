@@ -3,21 +3,22 @@
 import base64
 import gzip
 import json
-import re
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Page, Route, sync_playwright
+from playwright.sync_api import Browser, Page, Route
 
 from braidcast import Case, InputError, load_model
 from braidcast.planner.model_arrays import model_bytes, pack, unpack
 from braidcast.surrogate.applicability import fields
 from braidcast.surrogate.model import SurrogateModel
 from braidcast.surrogate.prediction import Prediction
+from braidcast.surrogate.recipes import RECIPES
 
 SITE = "http://planner.test/"
 
@@ -25,10 +26,10 @@ SCRIPT = """
 import { Model, unpack } from "./model.js";
 import * as cases from "./case.js";
 const container = async (name) => (await fetch(name)).arrayBuffer();
-const base64 = (floats) => new Promise((resolve) => {
+const base64 = (arrays) => new Promise((resolve) => {
   const reader = new FileReader();
   reader.onload = () => resolve(reader.result.split(",")[1]);
-  reader.readAsDataURL(new Blob([floats]));
+  reader.readAsDataURL(new Blob(arrays));
 });
 window.planner = { Model, unpack, cases, container, base64 };
 """
@@ -45,20 +46,16 @@ def content(model: SurrogateModel) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def page(content: bytes) -> Iterator[Page]:
-    """A page with the model, its standard deviations ready."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path="/usr/bin/chromium", args=["--no-sandbox"]
-        )
-        page = browser.new_page()
-        mistakes: list[str] = []
-        page.on("pageerror", lambda error: mistakes.append(str(error)))
-        page.on("console", lambda line: mistakes.append(line.text))
-        serve(page, content)
-        yield page
-        browser.close()
-        assert mistakes == []
+def page(browser: Browser, content: bytes) -> Iterator[Page]:
+    """A page with the model; nothing is complained of in its console."""
+    page = browser.new_page()
+    troubles: list[str] = []
+    page.on("pageerror", lambda error: troubles.append(str(error)))
+    page.on("console", lambda line: troubles.append(line.text))
+    serve(page, content)
+    yield page
+    page.close()
+    assert troubles == []
 
 
 def serve(page: Page, content: bytes) -> None:
@@ -150,10 +147,11 @@ def test_predictions_are_those_of_python(page: Page, predicted: list[Prediction]
     assert len(shares) == 30 and shares == sorted(shares) and shares[-1] == 1.0
     for number, (case, expected) in enumerate(zip(studied(), predicted, strict=True)):
         found = page.evaluate(
-            "async (one) => { const { positions, std, stdNorm, gaps, ...rest } = model.predict(one);"
-            "const all = [positions, std, stdNorm, gaps].flatMap((x) => [...x]);"
-            "return { ...rest, arrays: await planner.base64(new Float64Array(all)),"
-            "alone: model.successProbability(one) }; }",
+            """async (one) => {
+                const { positions, std, stdNorm, gaps, ...rest } = model.predict(one);
+                const arrays = await planner.base64([positions, std, stdNorm, gaps]);
+                return { ...rest, arrays, alone: model.successProbability(one) };
+            }""",
             case,
         )
         nodes = len(expected.positions)
@@ -317,14 +315,10 @@ def test_other_bytes_are_no_container(page: Page) -> None:
         "() => { try { planner.unpack(new TextEncoder().encode('<html>').buffer) }"
         "catch (error) { return error.message } }"
     )
-    assert re.search("not of this planner", message)
+    assert "not of this planner" in message
 
 
 def test_only_our_recipe_is_for_the_planner(model: SurrogateModel) -> None:
-    from dataclasses import replace
-
-    from braidcast.surrogate.recipes import RECIPES
-
     with pytest.raises(InputError, match="must be of the recipe 'ours'"):
         model_bytes(replace(model, recipe=RECIPES["paper"]))
 

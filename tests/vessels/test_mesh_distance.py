@@ -12,7 +12,7 @@ from braidcast.errors import InputError
 from braidcast.vessels.extension import extended
 from braidcast.vessels.lumen_surface import LumenSurface
 from braidcast.vessels.mesh_distance import MeshDistance
-from problems.surfaces import cylinder, neck_depths
+from problems.surfaces import cylinder
 
 RNG = np.random.default_rng(4)
 
@@ -73,11 +73,6 @@ def test_beyond_an_open_end_the_wall_goes_on():
     distance, overrun = MeshDistance(surface).distance_and_overrun(points)
     assert_allclose(distance, np.hypot(*points[:, :2].T) - 1, atol=5e-5)
     assert_allclose(overrun, np.maximum(np.abs(points[:, 2] - 3) - 8, 0), atol=1e-12)
-
-
-def test_depth_in_the_neck():
-    for row in neck_depths():
-        assert row.holds, row
 
 
 def test_chunks_make_no_difference(monkeypatch):

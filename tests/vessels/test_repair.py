@@ -118,8 +118,8 @@ def test_flipped_patch_is_turned(tube):
 def test_orientation_of_a_bent_vessel_with_a_sac_goes_by_its_volume():
     curve = QuadraticBezier([0, 0, 0], [0, 30, 18], [0, 0, 50])
     top = curve.at_arc_length(curve.length / 2)[0]
-    vessel = SaccularVessel(Tube(curve, 2.0), Sphere(top + [0, 5, 0], 5.0))
-    vertices, triangles = vessel_surface(vessel)
+    vessel = SaccularVessel(Tube(curve, 2.0), Sphere(top + [0, 5, 0], 5.0), 0.0)
+    vertices, triangles = vessel_surface(vessel, 100)
     surface = repaired(vertices, triangles[:, ::-1])
     assert_is_wall(surface, 2)
     a, b, c = vertices[triangles].transpose(1, 0, 2)

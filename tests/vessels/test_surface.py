@@ -26,9 +26,10 @@ def volume(vertices, triangles):
 
 def is_watertight(triangles):
     """Every directed edge once, and once the other way."""
-    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    forward = {tuple(edge) for edge in edges.tolist()}
-    return len(forward) == len(edges) and forward == {(b, a) for a, b in forward}
+    a, b = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).T
+    count = triangles.max() + 1
+    forward, back = np.unique(a * count + b), np.unique(b * count + a)
+    return len(forward) == len(a) and np.array_equal(forward, back)
 
 
 def sac(y, z, R, R_a, f):

@@ -1,9 +1,9 @@
 """The page as the server sends it, and as one file that needs no server.
 
-Everything in ``static/`` is plain: index.html names a style sheet, an import map and a module
-by ``"./name"``; modules import each other by ``"./name.js"`` and by the names of the import map. In the single
-file each module is a data: URL of a larger import map, under a name of its own, because a relative
-name leads nowhere from such a URL; nothing else in a module is changed.
+Everything in ``static/`` is plain: index.html names a style sheet, an import map and a module by
+``"./name"``; modules import each other by ``"./name.js"`` and by the names of the import map. In
+the single file each module is a data: URL of a larger import map, under a name of its own, because
+a relative name leads nowhere from such a URL; nothing else in a module is changed.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ _IMPORT_MAP = re.compile(r"<script\s+type=\"importmap\"\s*>(.*?)</script>", re.S
 _MODULE = re.compile(r"<script\b[^>]*\btype=\"module\"[^>]*\bsrc=\"([^\"]+)\"[^>]*>\s*</script>")
 _STYLE = re.compile(r"<link\b[^>]*\brel=\"stylesheet\"[^>]*\bhref=\"([^\"]+)\"[^>]*>")
 _PRELOAD = re.compile(r"\s*<link\b[^>]*\brel=\"(?:modulepreload|preload|manifest)\"[^>]*>")
+_HEAD = re.compile(r"<head\b[^>]*>\s*<meta charset=[^>]*>")
 _RESOURCE = re.compile(r"\b(src|href)=\"((?!data:|https?:|#|mailto:)[^\"]+)\"")
 _SPECIFIER = re.compile(r"(\bfrom\s*|\bimport\s*\(?\s*)([\"'])(\.{1,2}/[^\"'\n]+)\2")
 
@@ -56,9 +57,9 @@ def policy(page: str) -> str:
 def single_file(contents: Contents, static: Path = STATIC) -> str:
     """The whole planner in one HTML file.
 
-    It has an element more, from which the page knows that there is no server:
-    ``<script type="application/json" id="embedded">`` with ``start``, what ``/api/start`` answers,
-    and ``model``, the model's arrays, gzip in base64, or null.
+    Beside the page it has two elements, from which the page knows that there is no server:
+    ``<script type="application/json" id="planner-start">``, what ``/api/start`` answers, and
+    ``<script type="text/plain" id="planner-model">``, the model's arrays, gzip in base64, or empty.
     """
     names = sorted(
         path.relative_to(static).as_posix() for path in static.rglob("*") if path.is_file()
@@ -81,17 +82,13 @@ def single_file(contents: Contents, static: Path = STATIC) -> str:
     page = _only(_MODULE, page, module)
     page = _outside_scripts(page, lambda text: _RESOURCE.sub(resource, text))
     model = contents.model
-    embedded = {
-        "start": json.loads(contents.start.plain),
-        "model": None if model is None else base64.b64encode(model.gzipped).decode(),
-    }
+    packed = "" if model is None else base64.b64encode(model.gzipped).decode()
     added = (
         f'<meta http-equiv="Content-Security-Policy" content="{_FILE_POLICY}">\n'
-        f"{_script('application/json', embedded, 'embedded')}\n"
+        f"{_script('application/json', json.loads(contents.start.plain), 'planner-start')}\n"
+        f'<script type="text/plain" id="planner-model">{packed}</script>'
     )
-    return _only(
-        re.compile(r"(<head\b[^>]*>\s*<meta charset=[^>]*>)"), page, lambda m: m[0] + added
-    )
+    return _only(_HEAD, page, lambda found: f"{found[0]}\n{added}")
 
 
 def _imports(page: str, static: Path, names: list[str]) -> dict[str, str]:

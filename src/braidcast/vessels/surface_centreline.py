@@ -13,7 +13,7 @@ from braidcast.vessels.centreline_search import find_centreline
 from braidcast.vessels.lumen_surface import LumenSurface, Opening
 from braidcast.vessels.mesh_distance import MeshDistance
 from braidcast.vessels.polyline import Polyline
-from braidcast.vessels.wording import about
+from braidcast.vessels.wording import about, counted, place
 
 if TYPE_CHECKING:
     from braidcast.vessels.surface_vessel import SurfaceSource
@@ -101,10 +101,8 @@ def _two_openings(source: SurfaceSource, surface: LumenSurface) -> Array:
     openings: list[Opening] = sorted(surface.openings, key=lambda o: -o.radius)
     if len(openings) == 2:
         return np.array([opening.centre for opening in openings])
-    places = ", ".join(
-        f"({', '.join(f'{x:.1f}' for x in o.centre)}) of radius {o.radius:.2f}" for o in openings
-    )
-    found = f"has {len(openings)} open ends: {places} mm" if openings else "has no open end"
+    ends = ", ".join(f"{place(o.centre)} of radius {o.radius:.2f} mm" for o in openings)
+    found = f"has {counted(len(openings), 'open end')}: {ends}" if openings else "has no open end"
     raise InputError(
         f"surface = {source.surface} {found}; ends = [[x, y, z], [x, y, z]] must say between which "
         "two places the centreline runs, from proximal to distal"

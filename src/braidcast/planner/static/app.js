@@ -218,7 +218,8 @@ class Planner {
     } else {
       const { success, successProbability } = prediction;
       root.className = success ? "success" : "failure";
-      write(root, `${success ? "✓ Success" : "✕ Failure"}, probability of success ${percent(successProbability)} (called from ${percent(this.model.threshold)} on)`);
+      root.replaceChildren(element("strong", { text: `${success ? "✓ Success" : "✕ Failure"}, ${percent(successProbability)}` }),
+        element("span", { text: `probability of success; called from ${percent(this.model.threshold)} on` }));
     }
   }
 
@@ -262,9 +263,11 @@ async function open() {
       if (event !== "gone") planner.schedule();
     });
     find("waiting").hidden = true;
+    document.body.dataset.ready = "page";
     await planner.model?.prepareStd();
     planner.stdReady = true;
     planner.schedule();
+    document.body.dataset.ready = "all"; // with standard deviations
   } catch (error) {
     find("waiting").hidden = false;
     write(find("waiting"), `The planner could not start: ${error.message}`);

@@ -146,27 +146,30 @@ export class GaussianProcesses {
 /** |F⁻¹ k|² of a packed inverse factor and a covariance (n): memory is the limit. */
 function explained(inverse, covariance) {
   const n = covariance.length;
-  let total = 0, begin = 0, i = 0;
-  // Two rows at a time, so that sums need not wait for each other.
-  for (; i + 1 < n; i += 2) {
-    const second = begin + i + 1;
-    let a = 0, b = 0, c = 0, d = 0, j = 0;
-    for (; j < i; j += 2) {
-      const left = covariance[j], right = covariance[j + 1];
-      a += inverse[begin + j] * left;
-      b += inverse[second + j] * left;
-      c += inverse[begin + j + 1] * right;
-      d += inverse[second + j + 1] * right;
+  let total = 0, first = 0, i = 0;
+  // Four rows at a time, so that sums need not wait for each other.
+  for (; i + 3 < n; i += 4) {
+    const second = first + i + 1, third = second + i + 2, fourth = third + i + 3;
+    let a = 0, b = 0, c = 0, d = 0;
+    for (let j = 0; j <= i; j++) {
+      const k = covariance[j];
+      a += inverse[first + j] * k;
+      b += inverse[second + j] * k;
+      c += inverse[third + j] * k;
+      d += inverse[fourth + j] * k;
     }
-    a += inverse[begin + i] * covariance[i];
-    b += inverse[second + i] * covariance[i] + inverse[second + i + 1] * covariance[i + 1];
-    total += (a + c) ** 2 + (b + d) ** 2;
-    begin = second + i + 2;
+    const k = covariance[i + 1], l = covariance[i + 2], m = covariance[i + 3];
+    b += inverse[second + i + 1] * k;
+    c += inverse[third + i + 1] * k + inverse[third + i + 2] * l;
+    d += inverse[fourth + i + 1] * k + inverse[fourth + i + 2] * l + inverse[fourth + i + 3] * m;
+    total += a * a + b * b + c * c + d * d;
+    first = fourth + i + 4;
   }
-  if (i < n) {
+  for (; i < n; i++) {
     let a = 0;
-    for (let j = 0; j <= i; j++) a += inverse[begin + j] * covariance[j];
+    for (let j = 0; j <= i; j++) a += inverse[first + j] * covariance[j];
     total += a * a;
+    first += i + 1;
   }
   return total;
 }

@@ -12,14 +12,14 @@ function ends(positions, along, device) {
   return [centres.slice(0, 3), centres.slice(-3)].map((centre) => along.closest([...centre]));
 }
 
-/** How far the ends reach beyond the neck's edges, along the centreline. */
+/** How far the ends reach past the neck's edges along the centreline; negative: within the neck. */
 function endRows(positions, along, neck, device) {
   const [first, last] = ends(positions, along, device);
   if (!neck) return [["proximal", "Proximal end at", measure(first, 2, "mm")], ["distal", "Distal end at", measure(last, 2, "mm")]];
-  const reach = (distance) => (distance >= 0 ? `${measure(distance, 2, "mm")} beyond` : `${measure(-distance, 2, "mm")} short of`);
+  const past = (distance) => measure(distance, 2, "mm");
   return [
-    ["proximal", "Proximal end, to the neck’s edge", reach(neck[0] - first)],
-    ["distal", "Distal end, to the neck’s edge", reach(last - neck[1])],
+    ["proximal", "Proximal end past the neck", past(neck[0] - first)],
+    ["distal", "Distal end past the neck", past(last - neck[1])],
   ];
 }
 
@@ -40,7 +40,7 @@ export function predictionRows(prediction, along, neck, device, milliseconds) {
     );
   } else rows.push(["std-mean", "Uncertainty (1 std), mean", "being prepared …"]);
   rows.push(
-    ["nearest", "Nearest training case", `${prediction.nearestCase}, ${measure(prediction.nearestDistance, 2, "std of predictors")}`],
+    ["nearest", "Nearest training case", `no. ${prediction.nearestCase}, ${measure(prediction.nearestDistance, 2, "std")} away`],
     ["time", "Prediction took", measure(milliseconds, 1, "ms")],
   );
   return rows;

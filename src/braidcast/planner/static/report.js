@@ -10,7 +10,7 @@ const STYLE = `
   h3, h4 { font-size: 1rem; margin: 1rem 0 .3rem; }
   .warning { border: 2px solid #b45309; padding: .4rem .7rem; font-weight: 600; }
   figure { margin: .6rem 0; display: inline-block; vertical-align: top; } figure img { max-width: 100%; border: 1px solid #c8ced6; }
-  .strip { border: 1px solid #c8ced6; } .strip svg { display: block; width: 100%; height: 70px; } .safe { fill: #d6e8f5; } .area { fill: none; }
+  .strip { border: 1px solid #c8ced6; } .strip svg { display: block; width: 100%; height: 70px; } .safe { fill: #d6e8f5; }
   .curve { fill: none; stroke: #0b62a4; stroke-width: 2; vector-effect: non-scaling-stroke; }
   .threshold { stroke: #555; stroke-dasharray: 6 4; vector-effect: non-scaling-stroke; }
   .now { stroke: #b45309; stroke-width: 2; vector-effect: non-scaling-stroke; }

@@ -3,27 +3,32 @@
 const COUNT = 101;
 export const ETAS = Array.from({ length: COUNT }, (_, i) => i / (COUNT - 1));
 
-/** η in the middle of the widest window at or above the threshold; without one, of the highest. */
+/** First and last place of every run of probabilities at or above the threshold. */
+function safeWindows(probabilities, threshold) {
+  const windows = [];
+  probabilities.forEach((probability, i) => {
+    if (probability < threshold) return;
+    if (windows.at(-1)?.[1] === i - 1) windows.at(-1)[1] = i;
+    else windows.push([i, i]);
+  });
+  return windows;
+}
+
+/** η in the middle of the widest safe window; without one, of the highest probability. */
 export function bestSite(probabilities, threshold) {
-  let [widest, width, from] = [null, 0, 0];
-  for (let i = 0; i <= probabilities.length; i++) {
-    if (probabilities[i] >= threshold) continue;
-    if (i - from > width) [widest, width] = [(from + i - 1) / 2, i - from];
-    from = i + 1;
-  }
-  const highest = probabilities.indexOf(Math.max(...probabilities));
-  return { eta: (widest ?? highest) / (probabilities.length - 1), safe: widest !== null };
+  const windows = safeWindows(probabilities, threshold);
+  const [widest] = windows.sort(([a, b], [c, d]) => d - c - (b - a));
+  const place = widest ? (widest[0] + widest[1]) / 2 : probabilities.indexOf(Math.max(...probabilities));
+  return { eta: place / (probabilities.length - 1), safe: Boolean(widest) };
 }
 
 /** The strip as SVG text in a box of 1000 × 100, η to the right, probability up. */
 export function stripPicture(probabilities, threshold, eta) {
-  const y = (probability) => (100 - 96 * probability - 2).toFixed(2);
-  const points = probabilities.map((p, i) => `${(1000 * i) / (probabilities.length - 1)},${y(p)}`).join(" ");
-  const windows = probabilities
-    .map((p, i) => (p >= threshold ? `<rect class="safe" x="${(1000 * (i - 0.5)) / (probabilities.length - 1)}" y="0" width="${1000 / (probabilities.length - 1) + 0.5}" height="100"/>` : ""))
-    .join("");
-  return `<svg viewBox="0 0 1000 100" preserveAspectRatio="none" aria-hidden="true">${windows}
-    <polygon class="area" points="0,100 ${points} 1000,100"/><polyline class="curve" points="${points}"/>
+  const x = (place) => ((1000 * place) / (probabilities.length - 1)).toFixed(1);
+  const y = (probability) => (98 - 96 * probability).toFixed(1);
+  const points = probabilities.map((probability, i) => `${x(i)},${y(probability)}`).join(" ");
+  const safe = safeWindows(probabilities, threshold).map(([from, to]) => `<rect class="safe" x="${x(from)}" y="0" width="${x(to - from)}" height="100"/>`).join("");
+  return `<svg viewBox="0 0 1000 100" preserveAspectRatio="none" aria-hidden="true">${safe}<polyline class="curve" points="${points}"/>
     <line class="threshold" x1="0" x2="1000" y1="${y(threshold)}" y2="${y(threshold)}"/>
     <line class="now" x1="${1000 * eta}" x2="${1000 * eta}" y1="0" y2="100"/></svg>`;
 }
@@ -83,7 +88,7 @@ export class Strip {
     const label = document.createElement("span");
     label.className = "threshold-label";
     label.textContent = text;
-    label.style.top = `${100 - 96 * this.threshold - 2}%`;
+    label.style.top = `${98 - 96 * this.threshold}%`;
     return label;
   }
 }

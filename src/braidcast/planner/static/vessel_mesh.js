@@ -6,8 +6,8 @@
 
 import { closest, nearest, placeAt } from "./bezier.js";
 
-const SPHERE_ROWS = 40;
-const SPHERE_COLUMNS = 64;
+const SPHERE_ROWS = 36;
+const SPHERE_COLUMNS = 56;
 
 /** The wall of a tubular vessel of case.js's geometry:
  *
@@ -22,12 +22,12 @@ export function lumenMesh(case_, geometry, { facets = 40, beyond = 1, closed = f
   const wall = new Wall(geometry);
   const rings = wall.addTube(facets, beyond);
   if (closed) wall.closeEnds(rings, facets);
-  const tubeTriangles = wall.triangles.length / 3;
+  const tubeTriangles = wall.triangles.count;
   if (geometry.sacCentre) wall.addSphere();
-  const triangles = new Uint32Array(wall.triangles);
+  const triangles = wall.triangles.values();
   return {
-    vertices: new Float32Array(wall.vertices),
-    normals: new Float32Array(wall.normals),
+    vertices: wall.vertices.values(),
+    normals: wall.normals.values(),
     triangles,
     tubeTriangles,
     necks: wall.loops.map((loop) => loop.map((vertex) => wall.point(vertex))),
@@ -35,10 +35,35 @@ export function lumenMesh(case_, geometry, { facets = 40, beyond = 1, closed = f
   };
 }
 
+/** Rows of three numbers, as many as come. */
+class Rows {
+  count = 0;
+
+  constructor(Kind) {
+    this.data = new Kind(3 * 16384);
+  }
+
+  push(a, b, c) {
+    if (3 * this.count === this.data.length) {
+      const { data } = this;
+      this.data = new data.constructor(2 * data.length);
+      this.data.set(data);
+    }
+    const start = 3 * this.count++;
+    this.data[start] = a;
+    this.data[start + 1] = b;
+    this.data[start + 2] = c;
+  }
+
+  values() {
+    return this.data.slice(0, 3 * this.count);
+  }
+}
+
 class Wall {
-  vertices = [];
-  normals = [];
-  triangles = [];
+  vertices = new Rows(Float32Array);
+  normals = new Rows(Float32Array);
+  triangles = new Rows(Uint32Array);
   loops = []; // of vertices, the neck's edge as the tube's triangles run along it
 
   constructor({ curve, length, vesselRadius, sacCentre, sacRadius }) {
@@ -48,36 +73,40 @@ class Wall {
   add(point, normal) {
     this.vertices.push(point[0], point[1], point[2]);
     this.normals.push(normal[0], normal[1], normal[2]);
-    return this.vertices.length / 3 - 1;
+    return this.vertices.count - 1;
   }
 
   point(vertex) {
-    return this.vertices.slice(3 * vertex, 3 * vertex + 3);
+    return [0, 1, 2].map((k) => this.vertices.data[3 * vertex + k]);
   }
 
   /** Distance of a point to the sphere of the sac, mm. */
-  toSphere([x, y, z]) {
+  toSphere(point) {
     const { centre: c } = this;
-    return c ? Math.hypot(x - c[0], y - c[1], z - c[2]) - this.sacRadius : Infinity;
+    if (!c) return Infinity;
+    const [x, y, z] = [point[0] - c[0], point[1] - c[1], point[2] - c[2]];
+    return Math.sqrt(x * x + y * y + z * z) - this.sacRadius;
   }
 
   /** The tube outside of the sphere; the number of its rings. */
   addTube(facets, beyond) {
     const { radius } = this;
-    const step = (3 * Math.PI * radius) / facets;
+    const step = (4 * Math.PI * radius) / facets;
     const rings = Math.ceil((this.length + 2 * beyond) / step) + 1;
     const places = Array.from({ length: rings }, (_, i) => placeAt(this.curve, -beyond + (i / (rings - 1)) * (this.length + 2 * beyond)));
     // A quadratic curve is plane: its binormal is the same all along.
     const binormal = binormalOf(places[0].tangent, places[rings - 1].tangent);
     const turns = Array.from({ length: facets }, (_, k) => [Math.cos((2 * Math.PI * k) / facets), Math.sin((2 * Math.PI * k) / facets)]);
-    const outside = [];
-    for (const { point: p, tangent } of places) {
-      const n = cross(binormal, tangent);
+    const outside = new Float64Array(rings * facets);
+    const [point, normal] = [[0, 0, 0], [0, 0, 0]];
+    for (const place of places) {
+      const n = cross(binormal, place.tangent);
       for (const [cos, sin] of turns) {
-        const normal = [cos * n[0] + sin * binormal[0], cos * n[1] + sin * binormal[1], cos * n[2] + sin * binormal[2]];
-        const point = [p[0] + radius * normal[0], p[1] + radius * normal[1], p[2] + radius * normal[2]];
-        this.add(point, normal);
-        outside.push(this.toSphere(point));
+        for (let k = 0; k < 3; k++) {
+          normal[k] = cos * n[k] + sin * binormal[k];
+          point[k] = place.point[k] + radius * normal[k];
+        }
+        outside[this.add(point, normal)] = this.toSphere(point);
       }
     }
     const following = new Map();
@@ -128,7 +157,7 @@ class Wall {
       const first = sense < 0 ? 0 : (rings - 1) * facets;
       for (let k = 0; k < facets && !this.endsCovered; k++) {
         const [a, b] = [first + k, first + ((k + 1) % facets)];
-        this.triangles.push(middle, ...(sense < 0 ? [b, a] : [a, b]));
+        this.triangles.push(middle, sense < 0 ? b : a, sense < 0 ? a : b);
       }
     });
   }
@@ -136,17 +165,20 @@ class Wall {
   /** The sphere outside of the tube, its pole opposite to the neck. */
   addSphere() {
     const { centre, sacRadius } = this;
-    const first = this.vertices.length / 3;
+    const first = this.vertices.count;
     closest(this.curve, ...centre);
     const { normal: pole } = nearest.distance > 1e-9 ? this.onTube(centre) : { normal: [0, 1, 0] };
     const across = unit(cross(pole, leastAxis(pole)));
     const other = cross(pole, across);
-    const outside = [];
+    const outside = new Float64Array(first + SPHERE_ROWS * SPHERE_COLUMNS);
+    const [point, normal] = [[0, 0, 0], [0, 0, 0]];
     const add = (angle, turn) => {
       const [a, b, c] = [Math.sin(angle) * Math.cos(turn), Math.sin(angle) * Math.sin(turn), Math.cos(angle)];
-      const normal = [0, 1, 2].map((k) => a * across[k] + b * other[k] + c * pole[k]);
-      const point = [0, 1, 2].map((k) => centre[k] + sacRadius * normal[k]);
-      outside[this.add(point, normal)] = closest(this.curve, ...point) - this.radius;
+      for (let k = 0; k < 3; k++) {
+        normal[k] = a * across[k] + b * other[k] + c * pole[k];
+        point[k] = centre[k] + sacRadius * normal[k];
+      }
+      outside[this.add(point, normal)] = closest(this.curve, point[0], point[1], point[2]) - this.radius;
     };
     for (let row = 1; row < SPHERE_ROWS; row++) {
       for (let k = 0; k < SPHERE_COLUMNS; k++) add((Math.PI * row) / SPHERE_ROWS, (2 * Math.PI * k) / SPHERE_COLUMNS);
@@ -186,8 +218,8 @@ class Wall {
     let vertex = -1;
     for (const loop of this.loops) {
       for (const candidate of loop) {
-        const k = 3 * candidate;
-        const square = (this.vertices[k] - found[0]) ** 2 + (this.vertices[k + 1] - found[1]) ** 2 + (this.vertices[k + 2] - found[2]) ** 2;
+        const [k, { data }] = [3 * candidate, this.vertices];
+        const square = (data[k] - found[0]) ** 2 + (data[k + 1] - found[1]) ** 2 + (data[k + 2] - found[2]) ** 2;
         if (square < best) [best, vertex] = [square, candidate];
       }
     }

@@ -29,11 +29,11 @@ function paletteTexture(name) {
 }
 
 const VERTEX = /* glsl */ `
-uniform highp sampler2D nodes;      // x, y, z in mm and share of the palette; a row for each wire
+// x, y, z in mm and share of the palette; a row for each wire, and one of the rings' centres.
+uniform highp sampler2D nodes;
 uniform float radius, leastRadius;  // mm
-uniform vec2 depths;                // of the braid's nearest and farthest node in view space, mm
 out vec3 vNormal;
-out float vShare, vDepth;
+out float vShare, vAverted;
 
 void main() {
   int last = textureSize(nodes, 0).x - 1, node = int(position.x), wire = gl_InstanceID;
@@ -47,7 +47,9 @@ void main() {
   vNormal = cos(position.y) * cross(side, tangent) + sin(position.y) * side;
   vec3 centre = (modelViewMatrix * vec4(here.xyz, 1.0)).xyz;
   vShare = here.w;
-  vDepth = clamp((depths.x - centre.z) / max(depths.x - depths.y, 1e-6), 0.0, 1.0);
+  vec3 ring = texelFetch(nodes, ivec2(node, textureSize(nodes, 0).y - 1), 0).xyz;
+  vec3 outward = (modelViewMatrix * vec4(here.xyz - ring, 0.0)).xyz;
+  vAverted = 0.5 - 0.5 * outward.z / max(length(outward), 1e-6);
   gl_Position = projectionMatrix * vec4(centre + max(radius, leastRadius) * vNormal, 1.0);
 }`;
 
@@ -56,7 +58,7 @@ uniform sampler2D palette;
 uniform vec3 plain, background;
 uniform float coloured, fading;
 in vec3 vNormal;
-in float vShare, vDepth;
+in float vShare, vAverted;
 out vec4 colour;
 
 void main() {
@@ -64,14 +66,14 @@ void main() {
   vec3 own = mix(plain, texture(palette, vec2((0.5 + ${COLOURS - 1}.0 * clamp(vShare, 0.0, 1.0)) / ${COLOURS}.0, 0.5)).rgb, coloured);
   float light = max(dot(normal, vec3(-0.30, 0.45, 0.84)), 0.0);
   vec3 lit = own * (0.5 + 0.55 * light) + 0.16 * pow(light, 24.0);
-  // What is farther away fades: the only sign of depth in a parallel view.
-  colour = vec4(mix(lit, background, fading * vDepth), 1.0);
+  // The side of the braid that is turned away fades: a parallel view has no other sign of depth.
+  colour = vec4(mix(lit, background, fading * vAverted), 1.0);
 }`;
 
 /** Tubes through `nodes` nodes each, `count` of them; a three.js object. */
 export class Wires extends THREE.Mesh {
   /** Radius in mm as drawn, least radius in pixels, plain colour "#rrggbb" and share 0…1 of
-   * the background that the farthest node takes on. */
+   * the background that the side turned away takes on. */
   constructor(count, nodes, { radius, pixels = 0.6, colour = "#6b7785", fading = 0 }) {
     const across = [-1, -0.5, 0, 0.5, 1].map((share) => (share * Math.PI) / 2);
     const place = new Float32Array(3 * nodes * across.length);
@@ -88,7 +90,7 @@ export class Wires extends THREE.Mesh {
     geometry.setAttribute("position", new THREE.BufferAttribute(place, 3));
     geometry.setIndex(index);
     geometry.instanceCount = count;
-    const texture = new THREE.DataTexture(new Float32Array(4 * count * nodes), nodes, count, THREE.RGBAFormat, THREE.FloatType);
+    const texture = new THREE.DataTexture(new Float32Array(4 * (count + 1) * nodes), nodes, count + 1, THREE.RGBAFormat, THREE.FloatType);
     const material = new THREE.ShaderMaterial({
       glslVersion: THREE.GLSL3,
       vertexShader: VERTEX,
@@ -98,7 +100,6 @@ export class Wires extends THREE.Mesh {
         nodes: { value: texture },
         radius: { value: radius },
         leastRadius: { value: 0 },
-        depths: { value: new THREE.Vector2(1, 0) },
         palette: { value: null },
         plain: { value: new THREE.Vector3() },
         background: { value: new THREE.Vector3() },
@@ -107,7 +108,7 @@ export class Wires extends THREE.Mesh {
       },
     });
     super(geometry, material);
-    Object.assign(this, { count, nodes, pixels, frustumCulled: false });
+    Object.assign(this, { wireCount: count, nodes, pixels, frustumCulled: false });
     this.data = texture.image.data;
     this.setColour(colour);
   }
@@ -118,12 +119,15 @@ export class Wires extends THREE.Mesh {
 
   /** Move to positions (3N) mm, node `order[k]` being the k-th along the wires, one after another. */
   setPositions(positions, order = null) {
-    const { data } = this;
-    for (let k = 0; k < this.count * this.nodes; k++) {
+    const { data, nodes, wireCount } = this;
+    const rings = data.subarray(4 * wireCount * nodes).fill(0);
+    for (let k = 0; k < wireCount * nodes; k++) {
       const node = 3 * (order ? order[k] : k);
-      data[4 * k] = positions[node];
-      data[4 * k + 1] = positions[node + 1];
-      data[4 * k + 2] = positions[node + 2];
+      const ring = 4 * (k % nodes);
+      for (let i = 0; i < 3; i++) {
+        data[4 * k + i] = positions[node + i];
+        rings[ring + i] += positions[node + i] / wireCount;
+      }
     }
     this.material.uniforms.nodes.value.needsUpdate = true;
   }
@@ -133,7 +137,7 @@ export class Wires extends THREE.Mesh {
     const { uniforms } = this.material;
     uniforms.coloured.value = values ? 1 : 0;
     if (!values) return;
-    for (let k = 0; k < this.count * this.nodes; k++) {
+    for (let k = 0; k < this.wireCount * this.nodes; k++) {
       // The texture interpolates shares: beyond the ends they stay at the ends.
       const share = (values[order ? order[k] : k] - low) / (high - low);
       this.data[4 * k + 3] = share > 0 ? Math.min(share, 1) : 0;
@@ -145,21 +149,10 @@ export class Wires extends THREE.Mesh {
     this.palette = name;
   }
 
-  /** What depends on the camera: mm of a device pixel, and how deep the nodes lie. */
-  prepare(camera, pixel, background) {
-    const { uniforms } = this.material;
-    uniforms.leastRadius.value = this.pixels * pixel;
-    uniforms.background.value.set(...rgb(background));
-    if (!uniforms.fading.value) return;
-    const [, , a, , , , b, , , , c, , , , d] = this.modelViewMatrix.multiplyMatrices(camera.matrixWorldInverse, this.matrixWorld).elements;
-    let nearest = -Infinity;
-    let farthest = Infinity;
-    for (let k = 0; k < this.data.length; k += 4) {
-      const z = a * this.data[k] + b * this.data[k + 1] + c * this.data[k + 2] + d;
-      if (z > nearest) nearest = z;
-      if (z < farthest) farthest = z;
-    }
-    uniforms.depths.value.set(nearest, farthest);
+  /** What depends on the camera, mm of a device pixel, and on the background. */
+  prepare(pixel, background) {
+    this.material.uniforms.leastRadius.value = this.pixels * pixel;
+    this.material.uniforms.background.value.set(...rgb(background));
   }
 
   dispose() {
