@@ -62,7 +62,8 @@ def test_one_that_takes_too_long_is_ended(monkeypatch: pytest.MonkeyPatch) -> No
 @pytest.mark.parametrize("seconds", [0.0, 0.3])
 def test_cancelled_its_process_ends(seconds: float) -> None:
     async def run() -> None:
-        command = (sys.executable, "-c", f"{SEND}print('{{' * 1000000, end='', flush=True); {FOREVER}")
+        half = "print('{' * 1000000, end='', flush=True); "
+        command = (sys.executable, "-c", SEND + half + FOREVER)
         task = asyncio.create_task(simulate_apart({}, lambda *said: None, command))
         await asyncio.sleep(seconds)
         task.cancel()

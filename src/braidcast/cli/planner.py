@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from braidcast.planner.contents import Contents
     from braidcast.surrogate.model import SurrogateModel
 
-_LOOPBACK = "127.0.0.1"
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def planner(
     case: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[CASE.toml]",
+            metavar="CASE.toml",
             help="The case to open with. Default: a stent across the neck of an aneurysm.",
             show_default=False,
         ),
@@ -44,7 +44,7 @@ def planner(
     host: Annotated[
         str,
         typer.Option("--host", help="Address to listen at; by default only this machine's own."),
-    ] = _LOOPBACK,
+    ] = _LOOPBACK[0],
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Only print the address.")
     ] = False,
@@ -82,9 +82,9 @@ def _serve(
         contents = _contents(case, model)
         from braidcast.planner.server import application
 
-        app = application(contents, any_host=host != _LOOPBACK)
+        app = application(contents, any_host=host not in _LOOPBACK)
         typer.echo(f"braidcast planner at {url(opened)} until Ctrl-C")
-        if host != _LOOPBACK:
+        if host not in _LOOPBACK:
             say(f"whoever reaches this machine as {host} can use the planner")
         if browser:
             # The socket listens already: a browser that is quicker than the server waits.

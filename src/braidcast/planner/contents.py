@@ -14,6 +14,7 @@ from braidcast.errors import InputError
 from braidcast.planner.opened_case import OpenedCase
 
 if TYPE_CHECKING:
+    from braidcast.devices import Braid
     from braidcast.surrogate.model import SurrogateModel
 
 _ALONG = 0.25
@@ -73,8 +74,6 @@ class Contents:
         ``version``; ``case``, the tables of the case; ``device``; ``modelName`` and ``card``
         (Markdown), or ``withoutModel``, a sentence; ``surface`` of a vessel that is given so.
         """
-        from braidcast.surrogate.model_card import model_card
-
         model, without = self._model
         started: dict[str, Any] = {
             "version": __version__,
@@ -82,7 +81,7 @@ class Contents:
             "device": device(self.opened.case.braid),
             "modelName": None if model is None else str(model.record["name"]),
             "withoutModel": without,
-            "card": None if model is None else model_card(model),
+            "card": None if model is None else _card(model),
             "surface": self._surface(),
         }
         return Packed(json.dumps(started, allow_nan=False).encode())
@@ -113,6 +112,12 @@ class Contents:
         }
 
 
-def device(braid: Any) -> dict[str, Any]:
+def _card(model: SurrogateModel) -> str:
+    from braidcast.surrogate.model_card import model_card  # not where there is no model: it is slow
+
+    return model_card(model)
+
+
+def device(braid: Braid) -> dict[str, Any]:
     """The numbers of a braid by name: what the page draws it from."""
     return {name: getattr(braid, name) for name in type(braid).__dataclass_fields__}

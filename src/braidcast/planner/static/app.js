@@ -19,14 +19,13 @@ import { ETAS, Strip, bestSite } from "./strip.js";
 import { theme } from "./theme.js";
 import { palette } from "./wires.js";
 
-const VIEW_KEYS = { 1: "front", 2: "back", 3: "side", 4: "top", 5: "along", 0: "reset" };
-
 const embedded = find("planner-start");
 const host = embedded ? new FileHost(embedded, find("planner-model")) : new ServerHost();
 const banners = new Banners(find("banners"));
 
 class Planner {
   #scheduled = false;
+  pictures = []; // of B and, side by side, of A
   stdReady = false;
   seen = null; // the last possible case that was looked at
   #pinned = { key: "", look: null };
@@ -36,8 +35,11 @@ class Planner {
     Object.assign(this, { start, model });
     this.fields = shownNumbers(start.case, model?.limits);
     this.initial = { tables: start.case, pinned: null, colour: "gap", compare: "off" };
-    this.dark = theme(find("theme"), (dark) => this.setDark(dark));
-    this.pictures = [new Picture(find("canvas"), this.dark)];
+    theme(find("theme"), (dark) => {
+      this.isDark = dark;
+      this.pictures.forEach(({ view }) => view.setDark(dark));
+    });
+    this.pictures.push(new Picture(find("canvas"), this.isDark));
     this.looker = new Looker(start, model, (tables) => this.simulation.of(tables));
     this.#build();
     this.readAddress();
@@ -75,10 +77,6 @@ class Planner {
     });
   }
 
-  setDark(dark) {
-    this.pictures?.forEach(({ view }) => view.setDark(dark));
-  }
-
   #build() {
     const number = (field) => (value, committed) => this.change({ tables: changed(this.state.tables, field, value) }, committed);
     const [site, ...others] = this.fields;
@@ -102,7 +100,6 @@ class Planner {
     find("colour").addEventListener("change", ({ target }) => this.change({ colour: target.value }));
     const turn = (name) => this.pictures.forEach(({ view }) => view.view(name));
     find("standard-views").addEventListener("click", ({ target }) => target.dataset.view && turn(target.dataset.view));
-    find("views").addEventListener("keydown", ({ key }) => VIEW_KEYS[key] && turn(VIEW_KEYS[key]));
     const name = () => (this.state.tables.title || "case").toLowerCase().replace(/[^a-z0-9]+/g, "_").slice(0, 40);
     downloads(find("downloads"), name, files(this), (text) => banners.set("download", "note", text));
     write(find("case-title"), this.start.case.title ?? "");
@@ -158,7 +155,7 @@ class Planner {
     const { prediction } = look;
     const site = ["site", "Proximal end of the crimped stent", `${look.geometry.startArcLength.toFixed(2)} mm`];
     const verdict = prediction ? [["probability", "Probability of success", percent(prediction.successProbability)], ["verdict", "Verdict", prediction.success ? "success" : "failure"]] : [];
-    return [site, ...verdict, ...look.rows.filter(([key]) => key !== "time"), ...look.simulated.filter(([key]) => key !== "sim-time")];
+    return [site, ...verdict, ...look.rows.filter(([key]) => key !== "time"), ...look.simulated.map(([key, what, value]) => [key, `Simulation: ${what}`, value])];
   }
 
   /** Rows [key, what, value] of B, what is seen, and of A if one is pinned. */
@@ -176,6 +173,8 @@ class Planner {
     write(find("view-b").lastElementChild, caption);
     this.pictures[0].show(this.#scene(now, second ?? null));
     if (sides) this.pictures[1].show(this.#scene(a, null));
+    if (this.refit) this.pictures[0].view.fit();
+    this.refit = false;
     if (!seen?.prediction && !seen?.simulation) return;
     const colours = this.#colours(seen);
     legend(find("legend"), colours, palette);
@@ -190,7 +189,7 @@ class Planner {
     const { shape, prediction, simulation, marks } = look;
     const positions = prediction?.positions ?? simulation?.positions;
     const braid = positions ? { positions, wires: this.looker.wires, device: this.looker.device } : null;
-    return { vessel: shape.vessel, braid, colours: braid && this.#colours(look), marks, ghost };
+    return { vessel: shape.vessel, braid, colours: braid && this.#colours(look), marks, ghost: braid && ghost };
   }
 
   #colours({ prediction, simulation, departure }) {
@@ -203,8 +202,12 @@ class Planner {
     find("view-a").hidden = !sides;
     write(find("view-a").lastElementChild, "A");
     find("views").classList.toggle("two", sides);
-    if (sides && !this.pictures[1]) this.pictures.push(new Picture(find("canvas-a"), document.documentElement.dataset.theme === "dark"));
+    if (sides && !this.pictures[1]) {
+      this.pictures.push(new Picture(find("canvas-a"), this.isDark));
+      lookTogether(...this.pictures.map(({ view }) => view));
+    }
     this.pictures.forEach(({ view }) => view.resize());
+    this.refit = true;
   }
 
   #showVerdict({ impossible, prediction, simulation }) {
@@ -243,6 +246,16 @@ class Planner {
     }
     this.strip.mark(tables.site.eta, prediction.successProbability);
     write(find("strip-value"), `${percent(prediction.successProbability)} here`);
+  }
+}
+
+/** Whichever of two views is turned, the other follows. */
+function lookTogether(one, other) {
+  const rounded = ({ pose }) => JSON.stringify(pose, (_, value) => (typeof value === "number" ? Number(value.toFixed(5)) : value));
+  for (const [from, to] of [[one, other], [other, one]]) {
+    from.onFrame(() => {
+      if (to.canvas.clientWidth && rounded(from) !== rounded(to)) to.pose = from.pose;
+    });
   }
 }
 

@@ -36,7 +36,18 @@ function lumen({ seen }) {
 async function page(planner) {
   const { start, state, seen, model, strip, pictures } = planner;
   const captions = state.compare === "sides" ? ["Case B", "Case A"] : [document.getElementById("view-b").lastElementChild.textContent || "As seen"];
-  const images = await Promise.all(captions.map(async (caption, i) => ({ caption, url: await dataUrl(await pictures[i].view.png()) })));
+  const colours = document.getElementById("legend").ariaLabel ?? "";
+  const images = [];
+  pictures.forEach((each) => each.view.setDark(false)); // for paper
+  for (const [i, caption] of captions.entries()) images.push(await picture(pictures[i].view, `${caption}. ${colours}`));
+  const { view } = pictures[0];
+  const { pose } = view;
+  for (const name of state.compare === "sides" ? [] : ["front", "top"]) {
+    view.view(name);
+    images.push(await picture(view, `From the ${name}`));
+  }
+  view.pose = pose;
+  pictures.forEach((each) => each.view.setDark(planner.isDark));
   const { a, b } = planner.bothRows;
   const own = b.map(([key, what, value]) => (a ? [what, a.find(([other]) => other === key)?.[2] ?? "–", value] : [what, value]));
   const remarks = [...document.querySelectorAll(".banner.error, .banner.warning")].map((banner) => banner.textContent);
@@ -50,6 +61,10 @@ async function page(planner) {
     toml: state.pinned ? `# Case B\n${toToml(state.tables)}\n# Case A\n${toToml(state.pinned)}` : toToml(state.tables),
     markdown: start.card,
   });
+}
+
+async function picture(view, caption) {
+  return { caption, url: await dataUrl(await view.png()) };
 }
 
 function dataUrl(blob) {

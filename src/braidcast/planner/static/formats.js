@@ -49,7 +49,7 @@ export function stl(vertices, triangles) {
   new Uint8Array(data.buffer).set(new TextEncoder().encode("braidcast lumen surface, mm".padEnd(80)));
   data.setUint32(80, count, true);
   for (let t = 0; t < count; t++) {
-    const [a, b, c] = [0, 1, 2].map((k) => vertices.subarray(3 * triangles[3 * t + k], 3 * triangles[3 * t + k] + 3));
+    const [a, b, c] = [0, 1, 2].map((k) => vertices.slice(3 * triangles[3 * t + k], 3 * triangles[3 * t + k] + 3));
     const [ux, uy, uz, vx, vy, vz] = [b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]];
     const normal = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
     const size = Math.hypot(...normal) || 1;

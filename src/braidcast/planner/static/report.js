@@ -9,7 +9,7 @@ const STYLE = `
   h1 { font-size: 1.5rem; margin: 0; } h2 { font-size: 1.1rem; margin: 1.4rem 0 .4rem; border-bottom: 1px solid #c8ced6; }
   h3, h4 { font-size: 1rem; margin: 1rem 0 .3rem; }
   .warning { border: 2px solid #b45309; padding: .4rem .7rem; font-weight: 600; }
-  figure { margin: .6rem 0; display: inline-block; vertical-align: top; } figure img { max-width: 100%; border: 1px solid #c8ced6; }
+  figure { margin: .6rem 0; display: inline-block; vertical-align: top; width: 49%; } figure:first-of-type { width: 100%; } figure img { max-width: 100%; border: 1px solid #c8ced6; }
   .strip { border: 1px solid #c8ced6; } .strip svg { display: block; width: 100%; height: 70px; } .safe { fill: #d6e8f5; }
   .curve { fill: none; stroke: #0b62a4; stroke-width: 2; vector-effect: non-scaling-stroke; }
   .threshold { stroke: #555; stroke-dasharray: 6 4; vector-effect: non-scaling-stroke; }
@@ -42,7 +42,7 @@ export function report({ title, made, version, modelName, remarks, pictures, tab
       ...rows.map(([what, ...values]) => element("tr", {}, element("th", { text: what }), ...values.map((text) => element("td", { text }))))));
   }
   body.append(heading("The case"), element("pre", { text: toml }));
-  if (markdown) body.append(heading("The model"), card(markdown));
+  if (markdown) body.append(card(markdown));
   const head = element("head", {}, element("meta", { charset: "utf-8" }), element("title", { text: `braidcast: ${title || "report"}` }), element("style", { text: STYLE }));
   return `<!doctype html>\n${element("html", { lang: "en" }, head, body).outerHTML}\n`;
 }

@@ -5,6 +5,8 @@ import { complaint, geometry } from "./case.js";
 import { nodesOfWires } from "./braid.js";
 import { departure, predictionRows, simulationRows } from "./readouts.js";
 
+const SITE_POINTS = 33; // of the part of the centreline that the crimped device takes
+
 /** Looks at cases with one model (or none), in tubes or in the one surface that was opened. */
 export class Looker {
   #shape = { key: "" };
@@ -61,7 +63,7 @@ export class Looker {
   }
 
   #marks({ startArcLength, crimpedLength, sacCentre, sacRadius, vesselRadius }, { along }) {
-    const site = [startArcLength, startArcLength + crimpedLength].map((arc) => along.at(arc));
+    const site = Array.from({ length: SITE_POINTS }, (_, i) => along.at(startArcLength + (i / (SITE_POINTS - 1)) * crimpedLength));
     if (!sacCentre) return { neck: null, sac: null, site };
     const below = along.at(along.closest(sacCentre));
     const away = sacCentre.map((x, k) => x - below[k]);

@@ -2,7 +2,7 @@
 
 const system = matchMedia("(prefers-color-scheme: dark)");
 
-/** `onChange(dark)` at every change; returns whether it is dark now. */
+/** `onChange(dark)` now and at every change. */
 export function theme(button, onChange) {
   let chosen = null;
   try {
@@ -24,5 +24,4 @@ export function theme(button, onChange) {
   });
   system.addEventListener("change", apply);
   apply();
-  return dark();
 }

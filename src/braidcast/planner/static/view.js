@@ -3,14 +3,15 @@
 import * as THREE from "three";
 import { OrbitControls } from "./vendor/OrbitControls.js";
 import { placeAt } from "./bezier.js";
+import { drawRuler } from "./ruler.js";
 import { lumenMesh } from "./vessel_mesh.js";
-import { VIEWS, axesOf, roundLength } from "./views.js";
-import { MAGNIFICATION, Wires, rgb } from "./wires.js";
+import { VesselShell } from "./vessel_shell.js";
+import { VIEWS, axesOf } from "./views.js";
+import { MAGNIFICATION, Wires } from "./wires.js";
 
 /** Colours on light and on dark; the vessel's are seen through. */
 const LIGHT = { background: "#ffffff", text: "#1b1f24", vessel: "#c98a76", sac: "#b5557f", neck: "#7a1f4b", site: "#3b4754", ghost: "#d55e00", wires: "#5d6875", ground: 1.3 };
 const DARK = { background: "#15191e", text: "#e8ebee", vessel: "#e0b3a4", sac: "#e58fb3", neck: "#ffb3d1", site: "#c3ccd6", ghost: "#ff9a3d", wires: "#aab4bf", ground: 2.6 };
-const AXES = ["#d55e00", "#009e73", "#3f8fd2"]; // of x, y, z
 /** Software rendering takes its time by the pixel: no more of them than these. */
 const MOST_PIXELS = 2.4e6;
 const DISTANCE = 500; // of the eye, mm; all that is looked at is nearer
@@ -18,41 +19,13 @@ const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDo
 const KEY_TURN = Math.PI / 36;
 const KEY_ZOOM = 1.15;
 
-const VESSEL_VERTEX = /* glsl */ `
-uniform vec4 sac;        // centre and radius, mm
-uniform float sphere, nearer;
-out vec3 vNormal, vPlace;
-
-void main() {
-  vPlace = position;
-  vNormal = (modelViewMatrix * vec4(mix(normal, position - sac.xyz, sphere), 0.0)).xyz;
-  vec4 place = modelViewMatrix * vec4(position, 1.0);
-  // Wires are drawn thicker than they are, and may press into the wall: it steps aside, mm, so as
-  // not to cut into them. In a parallel view that is not seen.
-  place.z += nearer;
-  gl_Position = projectionMatrix * place;
-}`;
-
-const VESSEL_FRAGMENT = /* glsl */ `
-uniform vec4 sac;
-uniform vec3 vessel, inSac;
-uniform float sphere, strength;
-in vec3 vNormal, vPlace;
-out vec4 colour;
-
-void main() {
-  float facing = abs(normalize(vNormal).z);
-  float marked = max(sphere, step(distance(vPlace, sac.xyz), sac.w));
-  colour = vec4(mix(vessel, inSac, marked), 0.16 * strength + 0.45 * pow(1.0 - facing, 2.5));
-}`;
-
 export class View {
   /** Milliseconds of script in the last frame. */
   frameMilliseconds = 0;
   #hooks = new Set();
   #frame = 0;
   #marks = { neck: null, sac: null, site: null };
-  #vessel = null; // {middle, axes, necks, shape: THREE.Mesh}
+  #vessel = null; // {middle, necks, axes of a tube, reach of a surface}
   #size = [0, 0];
 
   /** Throws where the browser gives no WebGL 2. The canvas's parent must be positioned: axes and
@@ -88,8 +61,8 @@ export class View {
     const { signal } = this.listeners;
     canvas.addEventListener("keydown", (event) => this.#key(event), { signal });
     // three.js prepares itself for a new context; what the old one held is given up with it.
-    canvas.addEventListener("webglcontextlost", () => this.space.children.forEach(release), { signal });
-    canvas.addEventListener("webglcontextrestored", () => this.render(), { signal });
+    canvas.addEventListener("webglcontextlost", () => this.space.children.forEach((child) => child.dispose()), { signal });
+    canvas.addEventListener("webglcontextrestored", () => this.setDark(this.dark), { signal });
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(canvas);
     this.setDark(dark);
@@ -121,21 +94,18 @@ export class View {
 
   /** {kind: "tube", case, geometry} or {kind: "surface", vertices (3n) mm, triangles (3m)}. */
   setVessel(vessel) {
-    const tube = vessel.kind === "tube";
-    const mesh = tube ? lumenMesh(vessel.case, vessel.geometry) : vessel;
-    const shape = this.#shape(mesh, tube);
-    this.#vessel = { shape, necks: mesh.necks ?? [] };
-    if (tube) {
+    if (!this.shell) this.space.add((this.shell = new VesselShell()));
+    if (vessel.kind === "tube") {
       const { curve, length, sacCentre } = vessel.geometry;
+      const mesh = lumenMesh(vessel.case, vessel.geometry);
+      this.shell.setTube(mesh);
       const [first, middle, last] = [0, 0.5, 1].map((share) => placeAt(curve, share * length).point);
-      Object.assign(this.#vessel, { middle, axes: axesOf(first, middle, last, sacCentre) });
-      this.setMarks(this.#marks);
+      this.#vessel = { middle, necks: mesh.necks, axes: axesOf(first, middle, last, sacCentre) };
     } else {
-      const { center, radius } = shape.boundingSphere;
-      this.#vessel.middle = center.toArray();
-      this.#vessel.reach = radius;
+      const { center, radius } = this.shell.setSurface(vessel.vertices, vessel.triangles);
+      this.#vessel = { middle: center.toArray(), necks: [], reach: radius };
     }
-    this.render();
+    this.setMarks(this.#marks);
   }
 
   /** Neck {centre, radius, normal}, sac {centre, radius} and site, the device's range as points
@@ -146,7 +116,7 @@ export class View {
     const loops = neck ? (this.#vessel?.necks.length ? this.#vessel.necks : neck.centre ? [circle(neck)] : []) : [];
     this.#line("necks", loops.map((loop) => [...loop, loop[0]]), { colour: this.colours.neck, pixels: 1.2 });
     this.#line("site", site ? [site] : [], { colour: this.colours.site, pixels: 1 });
-    this.#colourVessel();
+    this.shell?.setColours(this.colours, this.#marks.sac);
     this.render();
   }
 
@@ -163,12 +133,12 @@ export class View {
   setDark(dark) {
     this.dark = dark;
     this.colours = dark ? DARK : LIGHT;
-    this.renderer.setClearColor(new THREE.Color().setRGB(...rgb(this.colours.background), THREE.LinearSRGBColorSpace).convertSRGBToLinear());
+    this.renderer.setClearColor(this.colours.background);
     this.braid?.setColour(this.colours.wires);
     this.ghost?.setColour(this.colours.ghost);
     for (const line of this.necks ?? []) line.setColour(this.colours.neck);
     for (const line of this.site ?? []) line.setColour(this.colours.site);
-    this.#colourVessel();
+    this.shell?.setColours(this.colours, this.#marks.sac);
     this.render();
   }
 
@@ -276,7 +246,8 @@ export class View {
     const scale = this.overlay.width / this.#size[0];
     context.setTransform(scale, 0, 0, scale, 0, 0);
     context.clearRect(0, 0, ...this.#size);
-    this.#drawOverlay(context);
+    const turn = new THREE.Matrix4().extractRotation(this.camera.matrixWorldInverse).multiply(this.space.matrix);
+    drawRuler(context, this.#size, this.millimetresPerPixel, turn.elements, this.colours);
     this.frameMilliseconds = performance.now() - start;
     for (const hook of this.#hooks) hook(this);
   }
@@ -355,73 +326,6 @@ export class View {
     this.space.matrixWorldNeedsUpdate = true;
   }
 
-  /** The mesh of the wall, of one part or of tube and sac, in the buffers of the last one. */
-  #shape({ vertices, normals, triangles, tubeTriangles }, tube) {
-    if (!this.shells) this.#makeShells();
-    const { geometry } = this.shells[0];
-    fill(geometry, "position", vertices);
-    if (tube) fill(geometry, "normal", normals);
-    const index = fill(geometry, "index", Uint32Array.from(triangles));
-    if (!tube) {
-      // Without the spare room of the buffers, whose triangles would count.
-      const own = new THREE.BufferGeometry();
-      own.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(vertices), 3));
-      own.setIndex(new THREE.BufferAttribute(Uint32Array.from(triangles), 1));
-      own.computeVertexNormals();
-      own.computeBoundingSphere();
-      fill(geometry, "normal", own.attributes.normal.array);
-      geometry.boundingSphere = own.boundingSphere;
-    }
-    geometry.clearGroups();
-    geometry.addGroup(0, 3 * (tube ? tubeTriangles : index / 3), 0);
-    if (tube) geometry.addGroup(3 * tubeTriangles, index - 3 * tubeTriangles, 1);
-    return geometry;
-  }
-
-  /** Inside and outside of the wall: the far side is drawn before the near one. */
-  #makeShells() {
-    const geometry = new THREE.BufferGeometry();
-    geometry.boundingSphere = new THREE.Sphere();
-    this.sacs = [new THREE.Vector4(), new THREE.Vector4()]; // what marks tube or surface; the sac itself
-    this.shells = [THREE.BackSide, THREE.FrontSide].map((side) => {
-      const materials = [0, 1].map((sphere) => new THREE.ShaderMaterial({
-        glslVersion: THREE.GLSL3,
-        vertexShader: VESSEL_VERTEX,
-        fragmentShader: VESSEL_FRAGMENT,
-        side,
-        transparent: true,
-        depthWrite: false,
-        uniforms: {
-          sac: { value: this.sacs[sphere] },
-          sphere: { value: sphere },
-          nearer: { value: side === THREE.FrontSide ? 0.5 : -0.5 },
-          strength: { value: 1 },
-          vessel: { value: new THREE.Vector3() },
-          inSac: { value: new THREE.Vector3() },
-        },
-      }));
-      const mesh = new THREE.Mesh(geometry, materials);
-      mesh.frustumCulled = false;
-      this.space.add(mesh);
-      return mesh;
-    });
-    this.#colourVessel();
-  }
-
-  #colourVessel() {
-    if (!this.shells) return;
-    const { sac } = this.#marks;
-    const tube = Boolean(this.#vessel?.axes);
-    this.sacs[0].set(...(sac?.centre ?? [0, 0, 0]), sac && !tube ? sac.radius : -1);
-    this.sacs[1].set(...(sac?.centre ?? [0, 0, 0]), 0);
-    for (const material of this.shells.flatMap((shell) => shell.material)) {
-      // The far side is the ground on which wires are seen, the near side must not veil them.
-      material.uniforms.strength.value = material.side === THREE.FrontSide ? 0.5 : this.colours.ground;
-      material.uniforms.vessel.value.set(...rgb(this.colours.vessel));
-      material.uniforms.inSac.value.set(...rgb(this.colours.sac));
-    }
-  }
-
   #put(name, wires) {
     this.#remove(name);
     this[name] = wires;
@@ -435,7 +339,7 @@ export class View {
 
   #discard(object) {
     this.space.remove(object);
-    release(object);
+    object.dispose();
   }
 
   /** Lines, each through its points, kept where they have as many points as before. */
@@ -448,42 +352,6 @@ export class View {
     }
     this[name].forEach((line, i) => line.setPositions(lines[i].flat()));
   }
-
-  /** Scale at the lower left, axes above it. */
-  #drawOverlay(context) {
-    const [width, height] = this.#size;
-    const { millimetresPerPixel: millimetres, colours } = this;
-    const length = roundLength(millimetres * Math.min(160, width / 3));
-    const [left, low] = [16, height - 16];
-    Object.assign(context, { font: "12px system-ui, sans-serif", fillStyle: colours.text, strokeStyle: colours.text, lineWidth: 2, textAlign: "left", textBaseline: "bottom" });
-    context.beginPath();
-    context.moveTo(left, low - 5);
-    context.lineTo(left, low);
-    context.lineTo(left + length / millimetres, low);
-    context.lineTo(left + length / millimetres, low - 5);
-    context.stroke();
-    context.fillText(`${length} mm`, left + 5, low - 4);
-
-    const origin = [left + 30, low - 62];
-    const turn = new THREE.Matrix4().extractRotation(this.camera.matrixWorldInverse).multiply(this.space.matrix).elements;
-    const axes = [0, 1, 2].map((k) => ({ k, x: turn[4 * k], y: -turn[4 * k + 1], depth: turn[4 * k + 2] }));
-    Object.assign(context, { textAlign: "center", textBaseline: "middle" });
-    for (const { k, x, y } of axes.sort((a, b) => a.depth - b.depth)) {
-      context.strokeStyle = context.fillStyle = AXES[k];
-      context.beginPath();
-      context.moveTo(...origin);
-      context.lineTo(origin[0] + 24 * x, origin[1] + 24 * y);
-      context.stroke();
-      context.fillText("xyz"[k], origin[0] + 32 * x, origin[1] + 32 * y);
-    }
-  }
-}
-
-/** Frees what an object has in graphics memory; if it is drawn again, it is put there again. */
-function release(object) {
-  if (object.dispose) return object.dispose();
-  object.geometry.dispose();
-  object.material.forEach((material) => material.dispose());
 }
 
 /** Points of a circle {centre, radius, normal}. */
@@ -495,22 +363,4 @@ function circle({ centre, radius, normal }) {
     const angle = (Math.PI * i) / 36;
     return new THREE.Vector3(...centre).addScaledVector(across, radius * Math.cos(angle)).addScaledVector(other, radius * Math.sin(angle)).toArray();
   });
-}
-
-/** Writes an attribute, or the index, into its buffer, or into a larger one; how many values. */
-function fill(geometry, name, values) {
-  const old = name === "index" ? geometry.index : geometry.attributes[name];
-  if (old && old.array.length >= values.length) {
-    old.array.set(values);
-    old.needsUpdate = true;
-    return values.length;
-  }
-  // The buffers that have grown too small go with the geometry's other ones, which come again.
-  geometry.dispose();
-  const array = new values.constructor(Math.ceil((1.3 * values.length) / 3) * 3);
-  array.set(values);
-  const attribute = new THREE.BufferAttribute(array, name === "index" ? 1 : 3);
-  if (name === "index") geometry.setIndex(attribute);
-  else geometry.setAttribute(name, attribute);
-  return values.length;
 }
