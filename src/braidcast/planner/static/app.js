@@ -230,7 +230,10 @@ class Planner {
   #showStrip({ impossible, prediction }) {
     if (!this.strip) return;
     this.strip.root.classList.toggle("stale", Boolean(impossible) || !this.strip.probabilities);
-    if (impossible) return;
+    if (impossible) {
+      write(find("strip-value"), "");
+      return;
+    }
     const { tables } = this.state;
     const key = JSON.stringify([tables.vessel, tables.aneurysm]);
     if (key !== this.#stripKey) {
