@@ -25,6 +25,7 @@ const banners = new Banners(find("banners"));
 
 class Planner {
   #scheduled = false;
+  refit = false; // whether the pictures have been arranged anew
   pictures = []; // of B and, side by side, of A
   stdReady = false;
   seen = null; // the last possible case that was looked at
@@ -33,6 +34,12 @@ class Planner {
 
   constructor(start, model) {
     Object.assign(this, { start, model });
+    if (start.surface) {
+      // Its site may be given by mm or by a point; the page knows sites by η alone.
+      const { startArcLength, spareLength } = start.surface;
+      const { crimped_radius } = start.case.site;
+      start.case.site = { eta: startArcLength / spareLength, ...(crimped_radius && { crimped_radius }) };
+    }
     this.fields = shownNumbers(start.case, model?.limits);
     this.initial = { tables: start.case, pinned: null, colour: "gap", compare: "off" };
     theme(find("theme"), (dark) => {
@@ -98,7 +105,10 @@ class Planner {
       onArrange: (compare) => this.change({ compare }),
     });
     find("colour").addEventListener("change", ({ target }) => this.change({ colour: target.value }));
-    const turn = (name) => this.pictures.forEach(({ view }) => view.view(name));
+    const turn = (name) => {
+      this.pictures.forEach(({ view }) => view.view(name));
+      this.#fit();
+    };
     find("standard-views").addEventListener("click", ({ target }) => target.dataset.view && turn(target.dataset.view));
     const name = () => (this.state.tables.title || "case").toLowerCase().replace(/[^a-z0-9]+/g, "_").slice(0, 40);
     downloads(find("downloads"), name, files(this), (text) => banners.set("download", "note", text));
@@ -173,7 +183,7 @@ class Planner {
     write(find("view-b").lastElementChild, caption);
     this.pictures[0].show(this.#scene(now, second ?? null));
     if (sides) this.pictures[1].show(this.#scene(a, null));
-    if (this.refit) this.pictures[0].view.fit();
+    if (this.refit) this.#fit();
     this.refit = false;
     if (!seen?.prediction && !seen?.simulation) return;
     const colours = this.#colours(seen);
@@ -182,6 +192,10 @@ class Planner {
     std.disabled = !seen.prediction?.stdNorm;
     away.disabled = !seen.departure;
     find("colour").value = colours.kind;
+  }
+
+  #fit() {
+    fitTogether(this.pictures.slice(0, this.state.compare === "sides" ? 2 : 1).map(({ view }) => view));
   }
 
   #scene(look, ghost) {
@@ -260,6 +274,18 @@ function lookTogether(one, other) {
       if (to.canvas.clientWidth && rounded(from) !== rounded(to)) to.pose = from.pose;
     });
   }
+}
+
+/** The first of the views shows what each of them would show. */
+function fitTogether(views) {
+  const poses = views.map((view) => (view.fit(), view.pose));
+  const [a, b] = [poses[0], poses.at(-1)];
+  const { clientWidth, clientHeight } = views[0].canvas;
+  const middle = (p, q) => p.map((x, k) => (x + q[k]) / 2);
+  const apart = Math.hypot(...a.target.map((x, k) => x - b.target[k]));
+  // At zoom 1 a view is 20 mm high.
+  const zoom = 1 / (1 / Math.min(a.zoom, b.zoom) + (apart * clientHeight) / (20 * clientWidth));
+  views[0].pose = { ...a, position: middle(a.position, b.position), target: middle(a.target, b.target), zoom };
 }
 
 const AWAY = {

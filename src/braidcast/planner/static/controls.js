@@ -3,6 +3,18 @@
 import { element, write } from "./elements.js";
 import { parse, shown } from "./numbers.js";
 
+/** A field for a number; what is being typed into it stays until it is complete. */
+function typedField(id, note) {
+  const field = element("input", { type: "text", id, inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-describedby": note });
+  field.addEventListener("input", () => (field.dataset.typing = "yes"));
+  for (const end of ["change", "blur"]) field.addEventListener(end, () => delete field.dataset.typing);
+  return field;
+}
+
+function display(field, text) {
+  if (!field.dataset.typing && field.value !== text) field.value = text;
+}
+
 /** One number: a slider over its range, a field that takes any number a case file may hold. */
 export class NumberControl {
   /** `onChange(value, committed)`; committed is false while a slider is dragged. */
@@ -13,7 +25,7 @@ export class NumberControl {
     const step = high - low <= 2 ? 0.001 : 0.01;
     const unit = field.unit ? ` (${field.unit})` : "";
     this.slider = element("input", { type: "range", min: low, max: high, step, "aria-label": `${field.label}${unit}, slider` });
-    this.typed = element("input", { type: "text", id, inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-describedby": `${id}-note` });
+    this.typed = typedField(id, `${id}-note`);
     this.note = element("p", { class: "note", id: `${id}-note`, role: "status" });
     const emit = (committed) => {
       this.#complain("");
@@ -36,7 +48,7 @@ export class NumberControl {
     this.value = value;
     const [low, high] = this.field.range;
     if (Number(this.slider.value) !== value) this.slider.value = value;
-    if (document.activeElement !== this.typed || parse(this.typed.value, this.field).value !== value) this.typed.value = shown(value);
+    display(this.typed, shown(value));
     const outside = this.field.trained && (value < low - 1e-9 || value > high + 1e-9);
     this.root.classList.toggle("outside", outside);
     if (!this.complaint) write(this.note, outside ? `Trained from ${low} to ${high}${this.field.unit && ` ${this.field.unit}`}.` : "");
@@ -57,8 +69,8 @@ export class SiteControl {
     this.eta = 0;
     this.slider = element("input", { type: "range", min: 0, max: 1, step: 0.001, "aria-label": "Site along the vessel, slider" });
     this.note = element("p", { class: "note", id: "site-note", role: "status" });
-    this.typed = this.#typed("number-site_eta");
-    this.millimetres = this.#typed("number-site_mm");
+    this.typed = typedField("number-site_eta", "site-note");
+    this.millimetres = typedField("number-site_mm", "site-note");
     this.ends = element("span", { id: "site-ends" });
     this.slider.addEventListener("input", () => this.#emit(Number(this.slider.value), false, onChange));
     this.slider.addEventListener("change", () => this.#emit(Number(this.slider.value), true, onChange));
@@ -91,13 +103,9 @@ export class SiteControl {
     write(this.ends, `crimped to ${(start + crimpedLength).toFixed(2)} mm of the centreline's ${length.toFixed(2)} mm`);
   }
 
-  #typed(id) {
-    return element("input", { type: "text", id, inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-describedby": "site-note" });
-  }
-
   #display() {
-    this.typed.value = shown(this.eta);
-    this.millimetres.value = (this.eta * this.spare).toFixed(2);
+    display(this.typed, shown(this.eta));
+    display(this.millimetres, (this.eta * this.spare).toFixed(2));
   }
 
   #emit(eta, committed, onChange) {

@@ -35,7 +35,7 @@ export class Looker {
     const { along, neck } = shape;
     return {
       impossible, geometry: lengths, shape, prediction, simulation, departure: away,
-      marks: this.#marks(lengths, shape),
+      marks: this.#marks(tables, lengths, shape),
       rows: prediction ? predictionRows(prediction, along, neck, this.device, took) : [],
       simulated: simulation ? simulationRows(simulation, away, along, neck, this.device) : [],
     };
@@ -62,13 +62,15 @@ export class Looker {
     return this.#shape;
   }
 
-  #marks({ startArcLength, crimpedLength, sacCentre, sacRadius, vesselRadius }, { along }) {
+  #marks({ aneurysm }, { startArcLength, crimpedLength, sacCentre, sacRadius, vesselRadius }, { along }) {
     const site = Array.from({ length: SITE_POINTS }, (_, i) => along.at(startArcLength + (i / (SITE_POINTS - 1)) * crimpedLength));
-    if (!sacCentre) return { neck: null, sac: null, site };
-    const below = along.at(along.closest(sacCentre));
-    const away = sacCentre.map((x, k) => x - below[k]);
+    const top = sacCentre ?? aneurysm?.neck;
+    if (!top) return { neck: null, sac: null, site };
+    const below = along.at(along.closest(top));
+    const away = top.map((x, k) => x - below[k]);
     const height = Math.hypot(...away);
     const normal = away.map((x) => x / height);
+    if (!sacCentre) return { neck: { centre: top, radius: aneurysm.neck_radius, normal }, sac: null, site };
     const radius = Math.sqrt(Math.max(0, sacRadius ** 2 - (height - vesselRadius) ** 2));
     return { neck: { centre: below.map((x, k) => x + vesselRadius * normal[k]), radius, normal }, sac: { centre: sacCentre, radius: sacRadius }, site };
   }
