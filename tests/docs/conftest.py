@@ -137,9 +137,27 @@ class Page:
             assert extra is not None and extra[1] in EXTRAS, f"{line}: not in pyproject.toml"
         elif words[:2] in (["dask", "scheduler"], ["dask", "worker"]):
             self._serve([word.replace("8786", self.port) for word in words])
+        elif words[:2] == ["braidcast", "planner"] and "--export" not in words:
+            self._open_planner(words)
         else:
             return False
         return True
+
+    def _open_planner(self, words: list[str]) -> None:
+        """Start it as the page says, but for the browser; it must print where it is."""
+        planner = subprocess.Popen(
+            [*words, "--no-browser", "--port", self.port],
+            cwd=self.folder,
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+            executable=BIN / words[0],
+        )
+        assert planner.stdout is not None
+        with planner.stdout:
+            assert f"http://127.0.0.1:{self.port}" in planner.stdout.readline().decode()
+            os.killpg(planner.pid, signal.SIGTERM)
+            assert planner.wait(20) == 0
 
     def _serve(self, words: list[str]) -> None:
         if words[1] == "scheduler":
