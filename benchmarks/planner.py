@@ -82,6 +82,11 @@ def opened(browser: Browser, address: str, troubles: list[str]) -> Page:
     return page
 
 
+def chromium() -> str | None:
+    """The system's browser; Playwright's own if there is none."""
+    return next(filter(None, map(shutil.which, ("chromium", "google-chrome"))), None)
+
+
 def memory(process: subprocess.Popen[str]) -> float:
     """Resident size of a process, MB."""
     for line in Path(f"/proc/{process.pid}/status").read_text().splitlines():
@@ -169,9 +174,10 @@ def sessions(browser: Browser, process: subprocess.Popen[str], address: str) -> 
 
 
 def main() -> int:
-    chromium = next(filter(None, map(shutil.which, ("chromium", "google-chrome"))), None)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=DRAWN_BY_THE_PROCESSOR)
+        browser = playwright.chromium.launch(
+            executable_path=chromium(), args=DRAWN_BY_THE_PROCESSOR
+        )
         start_up(browser)  # warm
         rows = start_up(browser)
         with planner() as (process, address):
