@@ -120,7 +120,8 @@ def relax(
         path.append(state.positions)
         if progress is not None:
             scale = options.first_step
-            progress(float(np.log1p(time / scale) / np.log1p(duration / scale)))
+            end = longest if np.isfinite(options.rest) else duration
+            progress(float(np.log1p(time / scale) / np.log1p(end / scale)))
         if time >= duration * (1.0 - 1e-12):
             if duration == longest or move / step * duration <= options.rest:
                 return Relaxation(last, True, "the time is over", steps, iterations, tuple(path))

@@ -29,7 +29,7 @@ function wires({ seen, looker }) {
 
 function lumen({ seen }) {
   const { vessel } = seen.shape;
-  const { vertices, triangles } = vessel.kind === "surface" ? vessel : lumenMesh(vessel.case, vessel.geometry, { facets: 64, closed: true });
+  const { vertices, triangles } = vessel.kind === "surface" ? vessel : lumenMesh(vessel.case, vessel.geometry, { facets: 120, beyond: 0, closed: true });
   return stl(vertices, triangles);
 }
 

@@ -6,9 +6,6 @@
 
 import { closest, nearest, placeAt } from "./bezier.js";
 
-const SPHERE_ROWS = 36;
-const SPHERE_COLUMNS = 56;
-
 /** The wall of a tubular vessel of case.js's geometry:
  *
  * {vertices: Float32Array 3n mm, normals: Float32Array 3n (those of the tube at the neck),
@@ -18,12 +15,12 @@ const SPHERE_COLUMNS = 56;
  *
  * `facets` around the tube; it goes on `beyond` mm after its ends. `closed`: as a solid for other
  * programs, with flat ends, and `watertight` says whether every edge has its two triangles. */
-export function lumenMesh(case_, geometry, { facets = 40, beyond = 1, closed = false } = {}) {
+export function lumenMesh(case_, geometry, { facets = 30, beyond = 1, closed = false } = {}) {
   const wall = new Wall(geometry);
   const rings = wall.addTube(facets, beyond);
   if (closed) wall.closeEnds(rings, facets);
   const tubeTriangles = wall.triangles.count;
-  if (geometry.sacCentre) wall.addSphere();
+  if (geometry.sacCentre) wall.addSphere(closed ? 72 : 28, closed ? 112 : 44);
   const triangles = wall.triangles.values();
   return {
     vertices: wall.vertices.values(),
@@ -163,14 +160,14 @@ class Wall {
   }
 
   /** The sphere outside of the tube, its pole opposite to the neck. */
-  addSphere() {
+  addSphere(rows, columns) {
     const { centre, sacRadius } = this;
     const first = this.vertices.count;
     closest(this.curve, ...centre);
     const { normal: pole } = nearest.distance > 1e-9 ? this.onTube(centre) : { normal: [0, 1, 0] };
     const across = unit(cross(pole, leastAxis(pole)));
     const other = cross(pole, across);
-    const outside = new Float64Array(first + SPHERE_ROWS * SPHERE_COLUMNS);
+    const outside = new Float64Array(first + rows * columns);
     const [point, normal] = [[0, 0, 0], [0, 0, 0]];
     const add = (angle, turn) => {
       const [a, b, c] = [Math.sin(angle) * Math.cos(turn), Math.sin(angle) * Math.sin(turn), Math.cos(angle)];
@@ -180,27 +177,27 @@ class Wall {
       }
       outside[this.add(point, normal)] = closest(this.curve, point[0], point[1], point[2]) - this.radius;
     };
-    for (let row = 1; row < SPHERE_ROWS; row++) {
-      for (let k = 0; k < SPHERE_COLUMNS; k++) add((Math.PI * row) / SPHERE_ROWS, (2 * Math.PI * k) / SPHERE_COLUMNS);
+    for (let row = 1; row < rows; row++) {
+      for (let k = 0; k < columns; k++) add((Math.PI * row) / rows, (2 * Math.PI * k) / columns);
     }
     add(0, 0);
     add(Math.PI, 0);
-    const top = first + (SPHERE_ROWS - 1) * SPHERE_COLUMNS;
+    const top = first + (rows - 1) * columns;
 
     const place = new Map();
     this.loops.forEach((loop) => loop.forEach((vertex, index) => place.set(vertex, { loop, index })));
     const cut = edgeCuts((i, j) => this.sphereCut(i, j, outside));
     const chain = (from, to) => alongLoop(place, from, to);
     const triangle = (a, b, c) => clip(a, b, c, outside, cut, this.triangles, chain);
-    for (let k = 0; k < SPHERE_COLUMNS; k++) {
-      const right = (k + 1) % SPHERE_COLUMNS;
+    for (let k = 0; k < columns; k++) {
+      const right = (k + 1) % columns;
       triangle(top, first + k, first + right);
-      for (let row = 0; row + 2 < SPHERE_ROWS; row++) {
-        const [a, b] = [first + row * SPHERE_COLUMNS + k, first + row * SPHERE_COLUMNS + right];
-        triangle(a, a + SPHERE_COLUMNS, b + SPHERE_COLUMNS);
-        triangle(a, b + SPHERE_COLUMNS, b);
+      for (let row = 0; row + 2 < rows; row++) {
+        const [a, b] = [first + row * columns + k, first + row * columns + right];
+        triangle(a, a + columns, b + columns);
+        triangle(a, b + columns, b);
       }
-      const last = first + (SPHERE_ROWS - 2) * SPHERE_COLUMNS;
+      const last = first + (rows - 2) * columns;
       triangle(top + 1, last + right, last + k);
     }
   }
