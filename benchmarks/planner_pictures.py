@@ -69,7 +69,7 @@ def main() -> None:
             def keep(state: str, page: Page = page, size: str = size) -> None:
                 page.wait_for_timeout(900)
                 image = Image.open(BytesIO(page.screenshot())).convert("RGB")
-                few = image.quantize(128, dither=Image.Dither.NONE)
+                few = image.quantize(256, dither=Image.Dither.NONE)
                 few.save(folder / f"{size}_{state}.png", optimize=True)
 
             states(page, keep)
