@@ -19,7 +19,7 @@ import pytest
 
 from braidcast import Deployment, InputError, __version__, results_folder, write_deployment
 from braidcast.deployment import drawing, output, picture
-from braidcast.results_folder import check_folder
+from braidcast.results_folder import check_file, check_folder
 
 SUMMARY_KEYS = {
     *("outcome", "deployed_length_mm", "free_length_mm", "foreshortening_percent"),
@@ -288,3 +288,11 @@ def test_a_disk_too_full_for_the_picture_costs_only_the_picture(
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert written.notes == ["no deployed.png: File too large"]
     assert names(tmp_path) == FILES
+
+
+def test_what_is_no_ordinary_file_is_not_replaced(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match="pipe is no ordinary file"):
+        check_file(pipe)
+    check_file(tmp_path / "new.html")

@@ -76,6 +76,8 @@ def check_file(path: str | Path) -> None:
     path = Path(path)
     if path.is_dir() or not path.name:
         raise InputError(f"output file = {path} is a folder, must be a file or a new name")
+    if path.exists() and not path.is_file():
+        raise InputError(f"output file = {path} is no ordinary file, must be one or a new name")
     if not path.parent.is_dir():
         raise InputError(
             f"output file = {path} must be in a folder that exists, {path.parent} does not"

@@ -8,13 +8,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import pytest
-import uvicorn
 from playwright.sync_api import Browser, Page, sync_playwright
 from starlette.applications import Starlette
 
 from braidcast.planner.contents import Contents
 from braidcast.planner.opened_case import OpenedCase
-from braidcast.planner.serve import listening, url
+from braidcast.planner.serve import listening, server_of, url
 from braidcast.planner.server import application
 from braidcast.surrogate.model_file import load_model
 
@@ -39,16 +38,7 @@ class Served:
 @contextmanager
 def _serving(app: Starlette, port: int = 0) -> Iterator[Served]:
     with listening("127.0.0.1", port) as opened:
-        config = uvicorn.Config(
-            app,
-            loop="asyncio",
-            http="h11",
-            ws="none",
-            lifespan="on",
-            log_level="warning",
-            timeout_graceful_shutdown=2,
-        )
-        server = uvicorn.Server(config)
+        server = server_of(app)
         thread = threading.Thread(target=server.run, args=([opened],))
         thread.start()
         try:

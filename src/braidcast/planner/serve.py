@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from braidcast.errors import InputError
 
 if TYPE_CHECKING:
+    import uvicorn
     from starlette.applications import Starlette
 
 LOOPBACK = "127.0.0.1"
@@ -66,8 +67,8 @@ def url(opened: socket.socket) -> str:
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 
-def serve(app: Starlette, opened: socket.socket) -> None:
-    """Serve at a socket until Ctrl-C or SIGTERM; simulations under way end with it."""
+def server_of(app: Starlette) -> uvicorn.Server:
+    """What serves the planner; ``run(sockets=[…])`` starts it."""
     import uvicorn
 
     config = uvicorn.Config(
@@ -81,6 +82,11 @@ def serve(app: Starlette, opened: socket.socket) -> None:
         server_header=False,
         timeout_graceful_shutdown=2,
     )
+    return uvicorn.Server(config)
+
+
+def serve(app: Starlette, opened: socket.socket) -> None:
+    """Serve at a socket until Ctrl-C or SIGTERM; simulations under way end with it."""
     # uvicorn raises the signal again once everything has ended: what was asked for is done.
     with suppress(KeyboardInterrupt, SystemExit):
-        uvicorn.Server(config).run(sockets=[opened])
+        server_of(app).run(sockets=[opened])

@@ -13,9 +13,12 @@ export class Cancelled extends Error {}
 
 const pause = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
 
+/** crypto.randomUUID is only there on this machine's own addresses and by https. */
+const randomName = () => Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
+
 export class ServerHost {
   kind = "server";
-  #session = sessionStorage.getItem("session") ?? crypto.randomUUID();
+  #session = sessionStorage.getItem("session") ?? randomName();
   #job = null;
   #started = null;
 
