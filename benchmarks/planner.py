@@ -18,13 +18,12 @@ from statistics import median, quantiles
 from playwright.sync_api import Browser, Page, TimeoutError, sync_playwright
 
 from deployment import cholesky_seconds
+from report import Bar, table_of_bars
 
 DRAWN_BY_THE_PROCESSOR = (
     *("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
     *("--no-sandbox", "--disable-dev-shm-usage"),
 )
-Row = tuple[str, float, float, str]
-"""What was asked: description, ours, the bar, unit."""
 
 MOVE = """async (count) => {
   const times = [];
@@ -95,7 +94,7 @@ def memory(process: subprocess.Popen[str]) -> float:
     return 0.0
 
 
-def start_up(browser: Browser) -> list[Row]:
+def start_up(browser: Browser) -> list[Bar]:
     """From the command to a page that answers, and what crossed the line meanwhile."""
     begin = time.perf_counter()
     with planner() as (_, address):
@@ -116,7 +115,7 @@ def start_up(browser: Browser) -> list[Row]:
     ]
 
 
-def moves(browser: Browser, address: str) -> list[Row]:
+def moves(browser: Browser, address: str) -> list[Bar]:
     """A thousand random slider moves, back and forward, a reload and another size."""
     troubles: list[str] = []
     page = opened(browser, address, troubles)
@@ -141,7 +140,7 @@ def moves(browser: Browser, address: str) -> list[Row]:
     ]
 
 
-def sessions(browser: Browser, process: subprocess.Popen[str], address: str) -> list[Row]:
+def sessions(browser: Browser, process: subprocess.Popen[str], address: str) -> list[Bar]:
     """Ten pages at once, three of which simulate another site each."""
     troubles: list[str] = []
     pages = [opened(browser, address, troubles) for _ in range(10)]
@@ -192,13 +191,7 @@ def main() -> int:
         f"Chromium {version}, ref = {median(cholesky_seconds(3)):.3f} s, load "
         f"{os.getloadavg()[0]:.1f}",
         "",
-        "| what | ours | bar | |",
-        "|---|---|---|---|",
-        *(
-            f"| {what} | {ours:.3g} {unit} | {bar:.3g} {unit} "
-            f"| {'held' if ours <= bar else '**missed**'} |"
-            for what, ours, bar, unit in rows
-        ),
+        *table_of_bars(rows),
     ]
     print("\n".join(lines))
     if sys.argv[1:]:

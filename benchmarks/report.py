@@ -1,9 +1,24 @@
-"""The tables of benchmarks/deployment.py."""
+"""The tables of benchmarks/deployment.py, and that of any benchmark's bars."""
 
 from statistics import median
 from typing import Any
 
 Record = dict[str, Any]
+Bar = tuple[str, float, float, str]
+"""What was asked: description, ours, the bar, unit."""
+
+
+def table_of_bars(bars: list[Bar]) -> list[str]:
+    """Lines of Markdown, one for each bar, and whether it is held."""
+    return [
+        "| what | ours | bar | |",
+        "|---|---|---|---|",
+        *(
+            f"| {what} | {ours:.3g} {unit} | {bar:.3g} {unit} "
+            f"| {'held' if ours <= bar else '**missed**'} |"
+            for what, ours, bar, unit in bars
+        ),
+    ]
 
 
 def page(records: list[Record]) -> tuple[str, bool]:
@@ -14,13 +29,7 @@ def page(records: list[Record]) -> tuple[str, bool]:
     lines = [
         f"braidcast {first['version']}, sources {first['sources']}, {first['linear_solver']}",
         "",
-        "| what | ours | bar | |",
-        "|---|---|---|---|",
-        *(
-            f"| {what} | {ours:.3g} {unit} | {bar:.3g} {unit} "
-            f"| {'held' if ours <= bar else '**missed**'} |"
-            for what, ours, bar, unit in bars
-        ),
+        *table_of_bars(bars),
         "",
         "| case | y_P1, z_P1, D_v, D_a, f, η | variant | outcome | clinical | ends in sac "
         "| iterations | CPU s | residual | penetration µm | mean µm | max µm | MB |",
@@ -31,7 +40,7 @@ def page(records: list[Record]) -> tuple[str, bool]:
     return "\n".join(lines), held
 
 
-def _bars(records: list[Record]) -> list[tuple[str, float, float, str]]:
+def _bars(records: list[Record]) -> list[Bar]:
     """What was asked: description, ours, the bar, unit."""
     ref = median(seconds for record in records for seconds in record["ref_seconds"])
     cpu = median(r["cpu_seconds"] for r in records if r["variant"] == "default")

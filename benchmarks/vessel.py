@@ -21,14 +21,13 @@ from braidcast.deployment.simulate import simulate
 from braidcast.vessels.surface import vessel_surface, write_stl
 from braidcast.vessels.surface_vessel import SurfaceSource, load_vessel
 from deployment import VARIANTS, cholesky_seconds, options_of, peak_memory, plan
+from report import Bar, table_of_bars
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "vessels"
 NAMES = ("siphon", "middle_cerebral")
-Row = tuple[str, float, float, str]
-"""What was asked: description, ours, the bar, unit."""
 
 
-def own_surface(number: int, folder: Path) -> list[Row]:
+def own_surface(number: int, folder: Path) -> list[Bar]:
     """A case of the plan against the same with its vessel's STL file and centreline."""
     case = plan()[number]
     path, line = folder / f"vessel_{number}.stl", folder / f"vessel_{number}.csv"
@@ -51,7 +50,7 @@ def own_surface(number: int, folder: Path) -> list[Row]:
     ]
 
 
-def centreline(name: str) -> list[Row]:
+def centreline(name: str) -> list[Bar]:
     """The centreline found in an example against that which it was made about."""
     made = np.loadtxt(EXAMPLES / f"{name}_centreline.csv", delimiter=",", skiprows=1)
     line = Case.from_toml(EXAMPLES / f"{name}.toml").centreline
@@ -64,7 +63,7 @@ def centreline(name: str) -> list[Row]:
     ]
 
 
-def example(name: str) -> list[Row]:
+def example(name: str) -> list[Bar]:
     """An example, four ways."""
     case = Case.from_toml(EXAMPLES / f"{name}.toml")
     done = {}
@@ -75,7 +74,7 @@ def example(name: str) -> list[Row]:
             f"{d.cpu_seconds:.1f} s CPU, {d.end_nodes_in_sac} end nodes in the sac",
             file=sys.stderr,
         )
-    rows: list[Row] = [
+    rows: list[Bar] = [
         (f"{name}: not converged", sum(not d.converged for d in done.values()), 0, ""),
         (f"{name}: residual, worst", max(d.residual_relative for d in done.values()), 1e-4, ""),
         (
@@ -135,7 +134,7 @@ def main() -> int:
     if sys.argv[1:2] == ["--read"]:
         print(json.dumps(reading(Path(sys.argv[2]))))
         return 0
-    rows: list[Row] = []
+    rows: list[Bar] = []
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         path = fine_surface(folder)
@@ -159,13 +158,7 @@ def main() -> int:
         [
             f"ref = {median(cholesky_seconds(3)):.3f} s",
             "",
-            "| what | ours | bar | |",
-            "|---|---|---|---|",
-            *(
-                f"| {what} | {ours:.3g} {unit} | {bar:.3g} {unit} "
-                f"| {'held' if ours <= bar else '**missed**'} |"
-                for what, ours, bar, unit in rows
-            ),
+            *table_of_bars(rows),
             "",
         ]
     )

@@ -57,7 +57,7 @@ class Case(Table):
     @model_validator(mode="after")
     def _is_feasible(self, info: ValidationInfo) -> Self:
         if isinstance(self.vessel, VesselFile):
-            _ = self._loaded(info.context)
+            self._read(info.context)
         feasibility.check(self)
         return self
 
@@ -135,7 +135,7 @@ class Case(Table):
     def centreline(self) -> QuadraticBezier | Polyline:
         """Centreline of the parent vessel."""
         if isinstance(self.vessel, VesselFile):
-            return self._loaded().centreline
+            return self._loaded.centreline
         return self.bezier
 
     @cached_property
@@ -143,7 +143,7 @@ class Case(Table):
         """The lumen within the surface of ``[vessel]``; ``InputError`` if there is none."""
         if not isinstance(self.vessel, VesselFile):
             raise InputError("vessel.surface is missing, must be the name of a surface's file")
-        return self._loaded().with_aneurysm(self._region())
+        return self._loaded.with_aneurysm(self._region())
 
     @cached_property
     def vessel_geometry(self) -> SaccularVessel | SurfaceVessel:
@@ -156,7 +156,12 @@ class Case(Table):
         sphere = Sphere(self.aneurysm_centre, self.aneurysm.diameter / 2.0)
         return SaccularVessel(tube, sphere, self.aneurysm.neck_fillet)
 
-    def _loaded(self, progress: Progress | None = None) -> SurfaceVessel:
+    @cached_property
+    def _loaded(self) -> SurfaceVessel:
+        """What was read: files that change later are of another case."""
+        return self._read()
+
+    def _read(self, progress: Progress | None = None) -> SurfaceVessel:
         # Not at the top: vessels about Bézier curves need none of it.
         from braidcast.vessels.surface_vessel import SurfaceSource, load_vessel
 
@@ -189,7 +194,7 @@ class Case(Table):
         if self.aneurysm is None:
             return None
         if self.aneurysm.surface is None:
-            line = self._loaded().centreline
+            line = self._loaded.centreline
             assert self.aneurysm.neck is not None and self.aneurysm.neck_radius is not None
             return NeckSac(np.array(self.aneurysm.neck), self.aneurysm.neck_radius, line)
         try:
@@ -214,7 +219,7 @@ class Case(Table):
     def crimped_radius(self) -> float:
         """Radius of the wire axes when the device is crimped, mm."""
         given = self.site.crimped_radius
-        return 0.3 * self.braid.axis_radius if given is None else given
+        return self.braid.usual_crimped_radius if given is None else given
 
     @property
     def crimped_length(self) -> float:

@@ -6,3 +6,7 @@ class InputError(ValueError):
 
     The command line prints the sentence and ends with exit code 2.
     """
+
+
+class OutsideGrid(ValueError):
+    """A distance was asked for where it is not known: off the grid or beyond an open end."""

@@ -12,6 +12,7 @@ from braidcast.errors import InputError
 
 if TYPE_CHECKING:
     from braidcast.case import Case
+    from braidcast.devices import Braid
     from braidcast.vessels.surface_vessel import SurfaceVessel
 
 #: Length of vessel, mm, that the crimped device leaves free at the least.
@@ -59,8 +60,8 @@ def _crimped_device_exists(case: Case) -> None:
 
 
 def _device_fits_across_tube(case: Case) -> None:
-    diameter = case.tube.diameter
-    least, most = 2.0 * _least_radius(case), 2.0 * _most_radius(case)
+    braid, diameter = case.braid, case.tube.diameter
+    least, most = 2.0 * least_radius(braid, case.crimped_radius), 2.0 * most_radius(braid)
     if diameter <= least:
         raise InputError(
             f"vessel.diameter = {diameter:.6g} mm must be above {least:.4g} mm, the crimped "
@@ -73,14 +74,14 @@ def _device_fits_across_tube(case: Case) -> None:
         )
 
 
-def _least_radius(case: Case) -> float:
+def least_radius(braid: Braid, crimped_radius: float) -> float:
     """Of a lumen in which the crimped device has a wire's thickness of room, mm."""
-    return case.crimped_radius + 2.0 * case.braid.wire_radius
+    return crimped_radius + 2.0 * braid.wire_radius
 
 
-def _most_radius(case: Case) -> float:
+def most_radius(braid: Braid) -> float:
     """Of a lumen that the free device still touches, mm."""
-    return case.braid.axis_radius + case.braid.wire_radius
+    return braid.axis_radius + braid.wire_radius
 
 
 def _device_fits_along(case: Case) -> None:
@@ -115,7 +116,7 @@ def _device_fits_across_surface(case: Case, vessel: SurfaceVessel) -> None:
     along = np.arange(start, start + case.crimped_length + _STEP, _STEP)
     places, lumen = line.at_arc_length(along), line.lumen_radius(along)
     room = -vessel.distance(places)
-    least, most = _least_radius(case), _most_radius(case)
+    least, most = least_radius(case.braid, case.crimped_radius), most_radius(case.braid)
     narrowest = int(room.argmin())
     if room[narrowest] <= least:
         raise InputError(
@@ -130,7 +131,7 @@ def _device_fits_across_surface(case: Case, vessel: SurfaceVessel) -> None:
             "stent's, or the stent lies loose"
         )
     bend = line.curvature_at_arc_length(along)
-    tightest = int((bend * case.crimped_radius).argmax())
+    tightest = int(bend.argmax())
     if bend[tightest] * least >= 1.0:
         raise InputError(
             f"vessel.surface = {vessel.name} has a centreline of {1.0 / bend[tightest]:.3g} mm "

@@ -81,7 +81,7 @@ def vessel(
                 source = SurfaceSource(str(surface), units, given, places)
                 braid = Device().braid
                 seen = VesselInspection(
-                    load_vessel(source, progress), braid, 0.3 * braid.axis_radius
+                    load_vessel(source, progress), braid, braid.usual_crimped_radius
                 )
         with naming(folder):
             written = write_inspection(seen, folder)
@@ -110,7 +110,7 @@ def _rows(seen: VesselInspection) -> list[tuple[str, str]]:
             "lumen radius",
             f"{radius.min():.2f} to {radius.max():.2f} mm, {radius.mean():.2f} on average",
         ),
-        ("tightest bend", f"{1.0 / max(seen.curvature.max(), 1e-9):.1f} mm radius"),
+        ("tightest bend", f"{seen.tightest_bend:.1f} mm radius"),
         (
             "crimped stent",
             f"{seen.crimped_length:.1f} mm long; its proximal end may be put at "

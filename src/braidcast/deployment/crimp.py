@@ -6,19 +6,16 @@ crimped radius alone, so it is computed once and kept.
 """
 
 import hashlib
-from contextlib import suppress
 from dataclasses import astuple, replace
-from io import BytesIO
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
-from braidcast.atomic import write_atomically
 from braidcast.cache_folder import cache_folder
 from braidcast.deployment.net import braid_net
 from braidcast.devices import Braid
 from braidcast.errors import InputError
+from braidcast.kept_arrays import keep, read_kept
 from braidcast.mechanics import (
     Equilibrium,
     Joints,
@@ -93,23 +90,17 @@ def crimped_state(
 
     Raises CrimpingFailed if crimping does not converge.
     """
-    path = (cache or cache_folder()) / _cache_name(braid, crimped_radius)
-    try:
-        with path.open("rb") as kept, np.load(kept, allow_pickle=False) as stored:
-            return State(stored["positions"], stored["rotations"])
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
-        pass
+    folders, name = (cache or cache_folder(),), _cache_name(braid, crimped_radius)
+    kept = read_kept(folders, name)
+    if kept is not None and {"positions", "rotations"} <= kept.keys():
+        return State(kept["positions"], kept["rotations"])
     result = crimp(braid, crimped_radius, progress=progress)
     if not result.converged:
         reason = f"crimping to {crimped_radius:.4g} mm failed: {result.reason}"
         raise CrimpingFailed(replace(result, reason=reason))
-    content = BytesIO()
-    np.savez(content, positions=result.state.positions, rotations=result.state.rotations)
-    # a cache that cannot be written costs time, not the result
-    with suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, content.getvalue())
-    return result.state
+    state = result.state
+    keep(folders, name, {"positions": state.positions, "rotations": state.rotations})
+    return state
 
 
 def _cache_name(braid: Braid, crimped_radius: float) -> str:

@@ -17,11 +17,10 @@ from braidcast.deployment.release import USUAL_SHIFT, ReleaseOptions, release, w
 from braidcast.deployment.result import Deployment
 from braidcast.deployment.shape import braid_length, ring_centres, wire_distance
 from braidcast.devices import Braid
-from braidcast.errors import InputError
+from braidcast.errors import InputError, OutsideGrid
 from braidcast.mechanics import Equilibrium, Joints, NewtonOptions, Problem, State
 from braidcast.mechanics.rotations import Array
 from braidcast.mechanics.system import System
-from braidcast.vessels.distance_grid import OutsideGrid
 
 STAGES = ("crimp", "position", "release")
 

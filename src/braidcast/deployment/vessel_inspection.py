@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from braidcast.devices import Braid
-from braidcast.feasibility import MARGIN
+from braidcast.feasibility import MARGIN, least_radius, most_radius
+from braidcast.vessels.edges import area_vectors
 from braidcast.vessels.surface_vessel import SurfaceVessel
 
 Array = NDArray[np.float64]
@@ -60,6 +61,21 @@ class VesselInspection:
         """Of the device, mm."""
         return self.braid.crimped_length(self.crimped_radius)
 
+    @property
+    def least_radius(self) -> float:
+        """Of a lumen with room for the crimped device, mm."""
+        return least_radius(self.braid, self.crimped_radius)
+
+    @property
+    def most_radius(self) -> float:
+        """Of a lumen that the free device touches, mm."""
+        return most_radius(self.braid)
+
+    @property
+    def tightest_bend(self) -> float:
+        """Least radius of curvature of the centreline, mm."""
+        return float(1.0 / max(self.curvature.max(), 1e-9))
+
     @cached_property
     def windows(self) -> list[tuple[float, float]]:
         """Where the proximal end of the crimped device may be put: ranges of arc length, mm.
@@ -67,8 +83,8 @@ class VesselInspection:
         All along it there is room for the crimped device and a wire, and a lumen that the free one
         would touch.
         """
-        fits = self.room > self.crimped_radius + 2.0 * self.braid.wire_radius
-        touches = self.lumen_radius < self.braid.axis_radius + self.braid.wire_radius
+        fits = self.room > self.least_radius
+        touches = self.lumen_radius < self.most_radius
         good = (fits & touches).astype(int)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], good, [0]])))
         runs = zip(self.along[edges[::2]], self.along[edges[1::2] - 1], strict=True)
@@ -82,10 +98,10 @@ class VesselInspection:
         surface, rng = self.vessel.surface, np.random.default_rng(0)
         count = min(20_000, len(surface.triangles))
         chosen = rng.choice(len(surface.triangles), count, replace=False)
-        corners = surface.vertices[surface.triangles[chosen]]
+        triangles = surface.triangles[chosen]
         shares = rng.dirichlet(np.ones(3), count)
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = area_vectors(surface.vertices, triangles)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        points = np.einsum("nk,nki->ni", shares, corners)
+        points = np.einsum("nk,nki->ni", shares, surface.vertices[triangles])
         points += rng.uniform(-NEAR, NEAR, (count, 1)) * normals
         return float(np.abs(self.vessel.grid.distance(points) - self.vessel.distance(points)).max())

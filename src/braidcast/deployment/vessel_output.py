@@ -58,7 +58,7 @@ def inspection_summary(seen: VesselInspection) -> dict[str, Any]:
         "lumen_radius_min_mm": float(seen.lumen_radius.min()),
         "lumen_radius_mean_mm": float(seen.lumen_radius.mean()),
         "lumen_radius_max_mm": float(seen.lumen_radius.max()),
-        "tightest_bend_mm": float(1.0 / max(seen.curvature.max(), 1e-9)),
+        "tightest_bend_mm": seen.tightest_bend,
         "crimped_length_mm": seen.crimped_length,
         "proximal_end_windows_mm": [list(window) for window in seen.windows],
         "distance_spacing_mm": vessel.grid.spacing,

@@ -70,12 +70,12 @@ def _outline(axis: Axes, seen: VesselInspection, frame: np.ndarray) -> None:
 
 
 def _radius(axis: Axes, seen: VesselInspection) -> None:
-    braid, end = seen.braid, seen.along[-1]
+    end = seen.along[-1]
     axis.plot(seen.along, seen.lumen_radius, color=BLUE, label="lumen radius")
     axis.plot(seen.along, seen.room, color=GREY, lw=0.9, label="from the centreline to the wall")
     for height, name in (
-        (braid.axis_radius + braid.wire_radius, "free stent"),
-        (seen.crimped_radius + 2.0 * braid.wire_radius, "crimped stent, with room"),
+        (seen.most_radius, "free stent"),
+        (seen.least_radius, "crimped stent, with room"),
     ):
         axis.axhline(height, color=VERMILLION, ls="--", lw=0.9)
         axis.annotate(

@@ -83,6 +83,11 @@ class Braid:
         return self.radius + self.wire_radius
 
     @property
+    def usual_crimped_radius(self) -> float:
+        """Of the wire axes where nobody says otherwise, 0.3 (R_s + r_w), mm (errata row 8)."""
+        return 0.3 * self.axis_radius
+
+    @property
     def angle_step(self) -> float:
         """Angle Δθ between neighbouring nodes of a wire, rad."""
         return 2.0 * math.pi / (self.wires // 2 if self.literal_angle else self.wires)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,6 @@ from braidcast.errors import InputError
 from braidcast.planner.opened_case import OpenedCase
 
 if TYPE_CHECKING:
-    from braidcast.devices import Braid
     from braidcast.surrogate.model import SurrogateModel
 
 _ALONG = 0.25
@@ -78,7 +77,7 @@ class Contents:
         started: dict[str, Any] = {
             "version": __version__,
             "case": self.opened.tables,
-            "device": device(self.opened.case.braid),
+            "device": asdict(self.opened.case.braid),
             "modelName": None if model is None else str(model.record["name"]),
             "withoutModel": without,
             "card": None if model is None else _card(model),
@@ -108,7 +107,7 @@ class Contents:
             "spareLength": case.spare_length,
             "startArcLength": case.start_arc_length,
             "remarks": list(vessel.remarks),
-            "device": device(case.braid),
+            "device": asdict(case.braid),
         }
 
 
@@ -116,8 +115,3 @@ def _card(model: SurrogateModel) -> str:
     from braidcast.surrogate.model_card import model_card  # not where there is no model: it is slow
 
     return model_card(model)
-
-
-def device(braid: Braid) -> dict[str, Any]:
-    """The numbers of a braid by name: what the page draws it from."""
-    return {name: getattr(braid, name) for name in type(braid).__dataclass_fields__}

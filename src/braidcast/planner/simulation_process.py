@@ -12,6 +12,7 @@ import os
 import sys
 import threading
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any, BinaryIO
 
 from braidcast.errors import InputError
@@ -40,11 +41,10 @@ def simulated(tables: Mapping[str, Any], report: _Reporter) -> bytes:
     from braidcast.case import Case
     from braidcast.deployment.output import summary
     from braidcast.deployment.simulate import simulate
-    from braidcast.planner.contents import device
     from braidcast.planner.model_arrays import pack
 
     deployment = simulate(Case.from_dict(tables), progress=report)
-    header = {**summary(deployment), "device": device(deployment.case.braid)}
+    header = {**summary(deployment), "device": asdict(deployment.case.braid)}
     arrays = {"positions": deployment.positions, "gaps": deployment.wire_distance}
     return pack(header, arrays)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from braidcast.errors import InputError
+from braidcast.errors import InputError, OutsideGrid
 from braidcast.vessels import spline_kernels
 from braidcast.vessels.centreline import as_rows
 from braidcast.vessels.distance_sampling import BLOCK, jumps, sample
@@ -26,10 +26,6 @@ from braidcast.vessels.lumen_surface import LumenSurface
 from braidcast.vessels.mesh_distance import MeshDistance
 
 Array = NDArray[np.float64]
-
-
-class OutsideGrid(ValueError):
-    """A distance was asked for where it is not known: off the grid or beyond an open end."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,10 +75,21 @@ def boundary_loops(triangles: IntArray) -> list[IntArray]:
     return loops
 
 
-def loop_area(points: Array) -> Array:
-    """Area vector (3,) mm² of a closed loop of points (k, 3), by the right hand."""
-    spokes = points - points.mean(axis=0)
-    return 0.5 * np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0)
+def loop_section(points: Array) -> tuple[Array, Array, float]:
+    """Centre of area, unit normal out of the lumen and radius of the area in a rim (k, 3) mm.
+
+    The rim runs as the wall's triangles do; the other way round the normal points inwards.
+    """
+    middle, after = points.mean(axis=0), np.roll(points, -1, axis=0)
+    # The wall runs round it clockwise, seen from outside.
+    vector = -0.5 * np.cross(points - middle, after - middle).sum(axis=0)
+    area = float(np.linalg.norm(vector))
+    if area == 0.0:
+        return middle, np.zeros(3), 0.0
+    normal = vector / area
+    share = np.cross(after - middle, points - middle) @ normal / (2.0 * area)
+    centre = share @ (points + after + middle) / 3.0
+    return centre, normal, math.sqrt(area / math.pi)
 
 
 def area_vectors(vertices: Array, triangles: IntArray) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from braidcast.errors import InputError
+from braidcast.vessels.edges import loop_section
 from braidcast.vessels.lumen_surface import LumenSurface, Opening
 from braidcast.vessels.mesh_distance import MeshDistance
 
@@ -70,7 +71,8 @@ def _with_longer_end(surface: LumenSurface, index: int, length: float) -> LumenS
     numbers = len(surface.vertices) + np.arange(len(added)).reshape(rings, -1)
     here = np.concatenate([opening.rim[None], numbers])
     openings = list(surface.openings)
-    openings[index] = _opening(end, opening.normal, numbers[-1])
+    centre, _, radius = loop_section(end)
+    openings[index] = Opening(centre, opening.normal, radius, numbers[-1])
     return replace(
         surface,
         vertices=np.concatenate([surface.vertices, added]),
@@ -101,13 +103,3 @@ def _strips(rings: NDArray[np.int64], triangles: NDArray[np.int64]) -> NDArray[n
     directed = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     same_way = (directed == [rings[0, 0], rings[0, 1]]).all(axis=1).any()
     return strips[:, ::-1] if same_way else strips
-
-
-def _opening(end: Array, normal: Array, rim: NDArray[np.int64]) -> Opening:
-    """The plane opening within a polygon ``end`` (k, 3)."""
-    spokes = end - end.mean(axis=0)
-    # Fan of triangles about the mean; their signed areas make up the polygon's.
-    areas = 0.5 * np.cross(spokes, np.roll(spokes, -1, axis=0)) @ normal
-    middles = (spokes + np.roll(spokes, -1, axis=0)) / 3.0
-    centre = end.mean(axis=0) + areas @ middles / areas.sum()
-    return Opening(centre, normal, float(np.sqrt(abs(areas.sum()) / np.pi)), rim)

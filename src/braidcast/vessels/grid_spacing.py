@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from braidcast.errors import InputError
+from braidcast.vessels.edges import area_vectors
 from braidcast.vessels.lumen_surface import LumenSurface
 from braidcast.vessels.mesh_distance import MeshDistance
 
@@ -73,12 +74,11 @@ def least_spacing(size: Array) -> float:
 
 def narrow_radius(surface: LumenSurface) -> float:
     """Radius, mm, that the ball touching the wall from inside has at all but 5 % of the wall."""
-    corners = surface.vertices[surface.triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
+    vectors = area_vectors(surface.vertices, surface.triangles)
+    areas = np.linalg.norm(vectors, axis=1)
     chosen = np.random.default_rng(0).choice(len(areas), _PLACES, p=areas / areas.sum())
-    places = corners[chosen].mean(axis=1)
-    inward = -normals[chosen] / areas[chosen, None]
+    places = surface.vertices[surface.triangles[chosen]].mean(axis=1)
+    inward = -vectors[chosen] / areas[chosen, None]
     distance = MeshDistance(surface)
     low, high = np.zeros(_PLACES), np.full(_PLACES, 0.5 * float(np.ptp(surface.vertices)))
     for _ in range(12):

@@ -6,7 +6,6 @@ stands on that plane.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,7 @@ from braidcast.vessels.edges import (
     area_vectors,
     boundary_loops,
     edges_of,
-    loop_area,
+    loop_section,
     sides_of,
 )
 from braidcast.vessels.lumen_surface import Opening
@@ -105,22 +104,8 @@ def _remarks(filled: list[tuple[float, str]]) -> list[str]:
 
 def opening(vertices: Array, rim: IntArray) -> Opening:
     """The opening with this rim, in the order in which the wall's triangles run along it."""
-    centre, normal, radius = _section(vertices[rim])
+    centre, normal, radius = loop_section(vertices[rim])
     return Opening(centre, normal, radius, rim)
-
-
-def _section(points: Array) -> tuple[Array, Array, float]:
-    """Centre of area, unit normal out of the lumen and radius of the area in a rim (k, 3)."""
-    vector = -loop_area(points)  # the wall runs round it clockwise, seen from outside
-    area = float(np.linalg.norm(vector))
-    if area == 0.0:
-        return points.mean(axis=0), np.zeros(3), 0.0
-    normal = vector / area
-    middle = points.mean(axis=0)
-    after = np.roll(points, -1, axis=0)
-    share = np.cross(after - middle, points - middle) @ normal / (2.0 * area)
-    centre = share @ (points + after + middle) / 3.0
-    return centre, normal, math.sqrt(area / math.pi)
 
 
 def _rims(triangles: IntArray) -> list[tuple[IntArray, IntArray]]:
@@ -140,7 +125,7 @@ def _rims(triangles: IntArray) -> list[tuple[IntArray, IntArray]]:
 
 def _loop(vertices: Array, triangles: IntArray, rim: IntArray, wall: IntArray) -> _Loop:
     points = vertices[rim]
-    centre, normal, radius = _section(points)
+    centre, normal, radius = loop_section(points)
     length = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
     vectors = area_vectors(vertices, triangles[wall])
     size = np.maximum(np.linalg.norm(vectors, axis=1), np.finfo(float).tiny)

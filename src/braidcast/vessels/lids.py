@@ -52,7 +52,7 @@ def without_lids(vertices: Array, triangles: IntArray) -> tuple[IntArray, list[s
     enough = SHARE**2 * max(size for _, size in lids)
     lids = [(lid, size) for lid, size in lids if size >= enough]
     remarks = [
-        f"the flat closed end at {place(_middle(vertices[triangles[lid]]))}, of radius "
+        f"the flat closed end at {place(_middle(vertices, triangles[lid]))}, of radius "
         f"{math.sqrt(size / math.pi):.2f} mm, was opened"
         for lid, size in lids
     ]
@@ -105,7 +105,7 @@ def _lid(
     if np.min(normals[members] @ normal) < math.cos(SPREAD):
         return None
     points = vertices[np.unique(triangles[members])]
-    centre = _middle(vertices[triangles[members]])
+    centre = _middle(vertices, triangles[members])
     radius = float(np.max(np.linalg.norm(points - centre, axis=1)))
     if size < ROUND * math.pi * radius**2:
         return None
@@ -145,9 +145,7 @@ def _stands_out(
     return bool(np.sum(length[sharp]) >= ALONG * np.sum(length))
 
 
-def _middle(corners: Array) -> Array:
-    """Centre of area (3,) of triangles given by their corners (m, 3, 3)."""
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    return area @ corners.mean(axis=1) / np.sum(area)
+def _middle(vertices: Array, triangles: IntArray) -> Array:
+    """Centre of area (3,) of triangles (m, 3)."""
+    area = np.linalg.norm(area_vectors(vertices, triangles), axis=1)
+    return area @ vertices[triangles].mean(axis=1) / np.sum(area)

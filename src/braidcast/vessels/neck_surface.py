@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from braidcast.vessels.edges import Array, IntArray, edges_of
 from braidcast.vessels.parametric import SaccularVessel
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 EDGES = 3.0
 """So many edges lie across the fillet's width."""
@@ -24,8 +21,8 @@ def rounded_neck(
     """
     longest = vessel.neck_fillet / EDGES
     while True:
-        edges, sides = _edges(triangles)
-        ends = vertices[edges]
+        edges = edges_of(triangles)
+        ends = vertices[edges.ends]
         middles = ends.mean(axis=1)
         reach = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         split = reach > longest
@@ -33,10 +30,10 @@ def rounded_neck(
         split[split] = _off_fillet(vessel, middles[split]) < 0.5 * reach[split]
         if not split.any():
             break
-        middle = np.full(len(edges), -1)
+        middle = np.full(len(edges.ends), -1)
         middle[split] = len(vertices) + np.arange(split.sum())
         vertices = np.concatenate([vertices, middles[split]])
-        triangles = _split(triangles, middle[sides])
+        triangles = _split(triangles, middle[edges.of_side].reshape(-1, 3))
     # What the union left between the exact vertices too; the middles of closed ends are far off.
     off = np.abs(vessel.distance(vertices))
     near = (off > 1e-12) & (off < 0.5 * vessel.neck_fillet)
@@ -54,15 +51,6 @@ def _off_fillet(vessel: SaccularVessel, points: Array) -> Array:
     # Both distances change by no more than the way walked.
     apart = np.abs(vessel.tube.distance(points) + vessel.aneurysm.depth(points))
     return 0.5 * (apart - vessel.neck_fillet)
-
-
-def _edges(triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Edges (k, 2), each once, and those of each triangle (m, 3): first to second corner, …"""
-    pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    count = int(triangles.max()) + 1
-    # One number an edge: sorted ten times as fast as pairs.
-    keys, sides = np.unique(pairs.min(axis=1) * count + pairs.max(axis=1), return_inverse=True)
-    return np.stack([keys // count, keys % count], axis=1), sides.reshape(-1, 3)
 
 
 def _split(triangles: IntArray, middles: IntArray) -> IntArray:

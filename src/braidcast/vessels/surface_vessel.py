@@ -16,14 +16,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from braidcast.cache_folder import cache_folder
 from braidcast.errors import InputError
+from braidcast.kept_arrays import keep, read_kept
 from braidcast.vessels.centreline import as_rows
 from braidcast.vessels.centreline_file import ENDINGS as CENTRELINES
 from braidcast.vessels.distance_grid import DistanceGrid
 from braidcast.vessels.extension import extended
 from braidcast.vessels.grid_spacing import EXTENSION, usual_spacing
 from braidcast.vessels.input_file import checked_ending
-from braidcast.vessels.kept_arrays import keep, read_kept
 from braidcast.vessels.lumen_surface import LumenSurface, Opening
 from braidcast.vessels.mesh_distance import MeshDistance
 from braidcast.vessels.polyline import Polyline
@@ -114,11 +115,12 @@ def load_vessel(source: SurfaceSource, progress: Progress | None = None) -> Surf
     """
     key, path = _key(source), Path(source.surface)
     if key not in _loaded:
-        kept = read_kept(path, f"{path.stem}.distance-{key}.npz")
+        folders, name = (path.parent, cache_folder()), f"{path.stem}.distance-{key}.npz"
+        kept = read_kept(folders, name)
         vessel = _restored(path.name, kept) if kept is not None else None
         if vessel is None:
             vessel = _made(source, progress or _no_progress)
-            keep(path, f"{path.stem}.distance-{key}.npz", _arrays(vessel))
+            keep(folders, name, _arrays(vessel))
         while len(_loaded) >= _MOST_LOADED:
             del _loaded[next(iter(_loaded))]
         _loaded[key] = vessel

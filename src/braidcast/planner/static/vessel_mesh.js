@@ -4,7 +4,7 @@
 // sphere takes over the tube's vertices there, so that nothing is open or overlaps. The neck's edge
 // is sharp: its fillet takes 3/16 of its width off it, 0.04 mm, less than a wire as it is drawn.
 
-import { closest, nearest, placeAt } from "./bezier.js";
+import { closest, cross, nearest, placeAt } from "./bezier.js";
 
 /** The wall of a tubular vessel of case.js's geometry:
  *
@@ -303,7 +303,6 @@ function isWatertight(triangles) {
   return true;
 }
 
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const unit = (a) => a.map((v) => v / Math.hypot(...a));
 const leastAxis = (a) => {
   const sizes = a.map(Math.abs);

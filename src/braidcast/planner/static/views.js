@@ -1,5 +1,7 @@
 // Standard views: the vessel's own axes, and where the eye is in them.
 
+import { cross, dot, minus } from "./bezier.js";
+
 /** Direction to the eye in the vessel's axes: x along it, y to the sac, z square to both. The sac
  * stays above except where it is looked at from above: there z points down. */
 export const VIEWS = {
@@ -10,10 +12,6 @@ export const VIEWS = {
   along: [-1, 0, 0], // from the proximal end, with the flow
   reset: [-0.25, 0.18, 1], // a little to the side and from above, so that tubes look round
 };
-
-const minus = (a, b) => a.map((v, i) => v - b[i]);
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
 /** a (3) at length 1, or `otherwise` where it has none. */
 function unit(a, otherwise) {
