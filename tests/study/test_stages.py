@@ -110,6 +110,12 @@ def test_the_source_of_what_a_stage_imports_is_in_its_key() -> None:
     assert len({stages._own_sources(f"braidcast.study.{name}") for name in names}) == len(names)
 
 
+def test_imports_are_found_wherever_they_stand() -> None:
+    text = "import a.b\nfrom c import d, e\ndef f():\n    def g():\n        from h.i import j\n"
+    found = set(stages._imported(compile(text, "module.py", "exec")))
+    assert found == {"a.b", "c", "c.d", "c.e", "h.i", "h.i.j"}
+
+
 def test_files_of_other_data_are_not_kept(empty: Study, client: Client) -> None:
     """The cases a stage reads are in its key by their checksums."""
     ids = empty.data_ids({5, 6, 90})

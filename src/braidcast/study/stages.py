@@ -9,15 +9,16 @@ again.
 
 from __future__ import annotations
 
-import ast
+import dis
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 from distributed import Client, KilledWorker, as_completed
@@ -174,11 +175,26 @@ def _own_sources(module: str) -> str:
         seen.add(name)
         source = path.read_bytes()
         digest.update(source)
-        for node in ast.walk(ast.parse(source)):
-            if isinstance(node, ast.ImportFrom) and node.module:
-                # What is imported from a package may be a module of it, or a name.
-                waiting += [node.module, *(f"{node.module}.{a.name}" for a in node.names)]
+        waiting += _imported(compile(source, path, "exec"))
     return digest.hexdigest()
+
+
+def _imported(code: CodeType) -> Iterator[str]:
+    """Modules that code imports, and names it imports from them, that may be modules too.
+
+    Read from the instructions: Python 3.11's ``ast.parse`` fails now and then if a thread of a
+    worker parses too (CPython issue 106905).
+    """
+    module = ""
+    for instruction in dis.get_instructions(code):
+        if instruction.opname == "IMPORT_NAME":
+            module = instruction.argval
+            yield module
+        elif instruction.opname == "IMPORT_FROM":
+            yield f"{module}.{instruction.argval}"
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _imported(constant)
 
 
 def _stamp(
