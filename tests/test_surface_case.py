@@ -314,6 +314,8 @@ def test_the_commands(
     out = capsys.readouterr().out
     for part in ("open end", "centreline", "lumen radius", "tightest bend", "signed distance"):
         assert part in out
+    assert run("vessel", "case.toml", "--units", "m") == 2
+    assert "--units cannot be given with a case file" in capsys.readouterr().err
     assert run("vessel", "nowhere.stl") == 2
     assert "surface = nowhere.stl cannot be read" in capsys.readouterr().err
     assert run("predict", "case.toml") == 2

@@ -9,6 +9,7 @@ import numpy as np
 
 from braidcast.case_tables import SacRegion, Vessel
 from braidcast.errors import InputError
+from braidcast.vessels.wording import place
 
 if TYPE_CHECKING:
     from braidcast.case import Case
@@ -121,7 +122,7 @@ def _device_fits_across_surface(case: Case, vessel: SurfaceVessel) -> None:
     if room[narrowest] <= least:
         raise InputError(
             f"vessel.surface = {vessel.name} leaves {room[narrowest]:.4g} mm about the centreline "
-            f"at {along[narrowest]:.4g} mm of it, {_place(places[narrowest])}, must leave more "
+            f"at {along[narrowest]:.4g} mm of it, {place(places[narrowest])}, must leave more "
             f"than {least:.4g} mm, the crimped stent and a wire"
         )
     if lumen.min() >= most:
@@ -135,7 +136,7 @@ def _device_fits_across_surface(case: Case, vessel: SurfaceVessel) -> None:
     if bend[tightest] * least >= 1.0:
         raise InputError(
             f"vessel.surface = {vessel.name} has a centreline of {1.0 / bend[tightest]:.3g} mm "
-            f"radius at {along[tightest]:.4g} mm of it, {_place(places[tightest])}, must be above "
+            f"radius at {along[tightest]:.4g} mm of it, {place(places[tightest])}, must be above "
             f"{least:.4g} mm, the crimped stent's"
         )
 
@@ -164,10 +165,6 @@ def _sac_meets_vessel(case: Case, vessel: SurfaceVessel) -> None:
         raise InputError(
             f"aneurysm.{field} holds {held:.0%} of the vessel's centreline, must be the sac alone"
         )
-
-
-def _place(point: np.ndarray) -> str:
-    return f"({', '.join(f'{x:.2f}' for x in point)}) mm"
 
 
 def _aneurysm_is_saccular(case: Case) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +11,7 @@ import typer
 from braidcast.cli.messages import naming, say, told
 from braidcast.cli.progress import bars
 from braidcast.cli.table import table
+from braidcast.errors import InputError
 
 if TYPE_CHECKING:
     from braidcast.deployment.vessel_inspection import VesselInspection
@@ -23,8 +25,8 @@ def vessel(
         ),
     ],
     units: Annotated[
-        str, typer.Option("--units", help="Of the surface: mm, cm, m or inch.")
-    ] = "mm",
+        str | None, typer.Option("--units", help="Of the surface: mm (default), cm, m or inch.")
+    ] = None,
     centreline: Annotated[
         Path | None,
         typer.Option(
@@ -54,7 +56,8 @@ def vessel(
     """Inspect a vessel's surface: what was repaired, how wide and bent it is, where a device fits.
 
     Writes vessel.png (outline, lumen radius and curvature), vessel.json, centreline.vtp and
-    repaired.stl. The device is the paper's, or that of the case file.
+    repaired.stl. The device is the paper's, or that of the case file, which also says units,
+    centreline and ends.
 
     Exit codes: 0 done; 1 the results could not be written; 2 bad input; 130 interrupted.
     """
@@ -70,6 +73,8 @@ def vessel(
             if surface.suffix.lower() == ".toml":
                 from braidcast.case import Case
 
+                options = {"--units": units, "--centreline": centreline, "--ends": ends}
+                _require_none(surface, options)
                 case = Case.from_toml(surface, progress)
                 seen = VesselInspection(case.surface_geometry, case.braid, case.crimped_radius)
             else:
@@ -78,7 +83,7 @@ def vessel(
 
                 places = None if ends is None else (ends[:3], ends[3:])
                 given = None if centreline is None else str(centreline)
-                source = SurfaceSource(str(surface), units, given, places)
+                source = SurfaceSource(str(surface), units or "mm", given, places)
                 braid = Device().braid
                 seen = VesselInspection(
                     load_vessel(source, progress), braid, braid.usual_crimped_radius
@@ -91,15 +96,24 @@ def vessel(
         typer.echo(table([*_rows(seen), ("files", names), ("in", folder)]))
 
 
+def _require_none(case: Path, options: Mapping[str, object]) -> None:
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise InputError(
+            f"{' and '.join(given)} cannot be given with a case file, must be in [vessel] of {case}"
+        )
+
+
 def _rows(seen: VesselInspection) -> list[tuple[str, str]]:
+    from braidcast.vessels.wording import place
+
     vessel, surface, line = seen.vessel, seen.vessel.surface, seen.vessel.centreline
     size = " by ".join(
         f"{extent:.1f}" for extent in surface.vertices.max(0) - surface.vertices.min(0)
     )
     rows = [("surface", f"{len(surface.triangles)} triangles, {size} mm")]
     for opening in surface.openings:
-        place = ", ".join(f"{x:.2f}" for x in opening.centre)
-        rows.append(("open end", f"at ({place}) mm, radius {opening.radius:.2f} mm"))
+        rows.append(("open end", f"at {place(opening.centre)}, radius {opening.radius:.2f} mm"))
     rows += [("noticed", remark) for remark in vessel.remarks]
     radius = seen.lumen_radius
     windows = "; ".join(f"{a:.1f} to {b:.1f} mm" for a, b in seen.windows)

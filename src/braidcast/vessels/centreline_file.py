@@ -22,6 +22,7 @@ from braidcast.errors import InputError
 from braidcast.vessels.centreline_branches import way_through
 from braidcast.vessels.input_file import checked_ending
 from braidcast.vessels.vtk_file import read_vtk_lines
+from braidcast.vessels.wording import place
 
 Array = NDArray[np.float64]
 Line = tuple[Array, Array | None]
@@ -86,12 +87,12 @@ def _between(lines: list[Line], ends: Array, where: str) -> Line:
     found = way_through([points for points, _ in lines], ends)
     points = np.concatenate([points for points, _ in lines])
     if found is None:
-        raise InputError(f"{where} does not join the ends {_place(ends[0])} and {_place(ends[1])}")
+        raise InputError(f"{where} does not join the ends {place(ends[0])} and {place(ends[1])}")
     way, away = found
     for end, distance in zip(ends, away, strict=True):
         if distance > _FARTHEST_END:
             raise InputError(
-                f"{where} is {distance:.3g} mm from the end {_place(end)}, must be at most "
+                f"{where} is {distance:.3g} mm from the end {place(end)}, must be at most "
                 f"{_FARTHEST_END:g} mm from it"
             )
     if any(radii is None for _, radii in lines):
@@ -215,14 +216,10 @@ def _refuse_bad_values(lines: list[Line], where: str) -> None:
 
 def _listed(lines: list[Line]) -> str:
     """The lines' different ends, the first six."""
-    ends = np.array([place for points, _ in lines for place in (points[0], points[-1])])
+    ends = np.array([end for points, _ in lines for end in (points[0], points[-1])])
     _, first = np.unique(np.round(ends, 1), axis=0, return_index=True)
-    places = [_place(ends[i]) for i in np.sort(first)]
+    places = [place(ends[i]) for i in np.sort(first)]
     return ", ".join(places[:6]) + (f" and {len(places) - 6} more" if len(places) > 6 else "")
-
-
-def _place(point: Array) -> str:
-    return f"({point[0]:.1f}, {point[1]:.1f}, {point[2]:.1f}) mm"
 
 
 _READERS: dict[str, Callable[[Path, str], tuple[list[Line], list[str]]]] = {

@@ -15,6 +15,7 @@ from braidcast.vessels.cross_sections import wall_points
 from braidcast.vessels.lumen_path import Distance, lumen_path
 from braidcast.vessels.polyline import Polyline
 from braidcast.vessels.tube_fit import LEAST_SEEN, Sections, fitted
+from braidcast.vessels.wording import place
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,7 @@ def find_centreline(
     try:
         return _found(distance, bounds, ends, given)
     except InputError as error:
-        raise InputError(f"ends = {_place(ends[0])} and {_place(ends[1])}: {error}") from None
+        raise InputError(f"ends = {place(ends[0])} and {place(ends[1])}: {error}") from None
 
 
 def _found(distance: Distance, bounds: Array, ends: Array, given: Array | None) -> Polyline:
@@ -150,12 +151,12 @@ def _refuse_doubtful(
         if (stop - first) * step > _LONGEST_HIDDEN * r[middle]:
             raise InputError(
                 f"no centreline found: the vessel's wall cannot be told for "
-                f"{(stop - first) * step:.3g} mm about {_place(centres[middle])}; {_GIVE_IT}"
+                f"{(stop - first) * step:.3g} mm about {place(centres[middle])}; {_GIVE_IT}"
             )
     worst = int(np.argmax(doubt))
     if doubt[worst] > _LARGEST_DOUBT:
         raise InputError(
-            f"no centreline found: its place near {_place(centres[worst])} is uncertain by "
+            f"no centreline found: its place near {place(centres[worst])} is uncertain by "
             f"{doubt[worst] * r[worst]:.2g} mm; {_GIVE_IT}"
         )
     depth = -distance(centres) / r
@@ -164,23 +165,19 @@ def _refuse_doubtful(
     worst = int(np.argmin(shallow))
     if shallow[worst] < _LEAST_DEPTH:
         raise InputError(
-            f"no centreline found: near {_place(centres[worst])} the wall is "
+            f"no centreline found: near {place(centres[worst])} the wall is "
             f"{depth[worst] * r[worst]:.3g} mm from the middle of a vessel of radius "
             f"{r[worst]:.3g} mm; {_GIVE_IT}"
         )
 
 
 def _refuse_far_ends(line: Polyline, ends: Array) -> None:
-    for name, end, place, s in zip(
+    for name, end, middle, s in zip(
         ("first", "second"), ends, (line.start, line.end), (0.0, line.length), strict=True
     ):
-        away, radius = float(np.linalg.norm(end - place)), float(line.lumen_radius(s)[0])
+        away, radius = float(np.linalg.norm(end - middle)), float(line.lumen_radius(s)[0])
         if away > 1.5 * radius:
             raise InputError(
                 f"the {name} is {away:.3g} mm from the middle of the vessel, must be less than "
                 f"{1.5 * radius:.3g} mm"
             )
-
-
-def _place(point: Array) -> str:
-    return f"({point[0]:.4g}, {point[1]:.4g}, {point[2]:.4g}) mm"

@@ -24,6 +24,7 @@ from braidcast.vessels.grid_spacing import (
 )
 from braidcast.vessels.lumen_surface import LumenSurface
 from braidcast.vessels.mesh_distance import MeshDistance
+from braidcast.vessels.wording import place
 
 Array = NDArray[np.float64]
 
@@ -124,9 +125,8 @@ class DistanceGrid:
 
     def _require_inside(self, points: Array, outside: int) -> None:
         if outside >= 0:
-            x, y, z = points[outside]
             raise OutsideGrid(
-                f"the point ({x:.4g}, {y:.4g}, {z:.4g}) mm is beyond an open end of the vessel or "
+                f"the point {place(points[outside])} is beyond an open end of the vessel or "
                 f"more than {MARGIN} mm outside all of it"
             )
 
@@ -193,10 +193,9 @@ def _require_one_side(
         blocks[tuple(found[:, :3].T // BLOCK)] = True
         labels, count = ndimage.label(blocks, np.ones((3, 3, 3)))
         first = places[labels[tuple(found[:, :3].T // BLOCK)] == 1]
-        x, y, z = first[np.argmin(np.linalg.norm(first - first.mean(axis=0), axis=1))]
+        middle = first[np.argmin(np.linalg.norm(first - first.mean(axis=0), axis=1))]
         raise InputError(
-            "crosses itself, is folded or turned inside out near "
-            f"({x:.2f}, {y:.2f}, {z:.2f}) mm"
+            f"crosses itself, is folded or turned inside out near {place(middle)}"
             + (f" and at {count - 1} more places" if count > 1 else "")
             + ": which side of it is the lumen must be clear everywhere"
         )

@@ -11,6 +11,7 @@ from braidcast.errors import InputError
 from braidcast.vessels.edges import loop_section
 from braidcast.vessels.lumen_surface import LumenSurface, Opening
 from braidcast.vessels.mesh_distance import MeshDistance
+from braidcast.vessels.wording import place
 
 Array = NDArray[np.float64]
 
@@ -50,17 +51,16 @@ def _with_longer_end(surface: LumenSurface, index: int, length: float) -> LumenS
     fitting = length
     while fitting > free and fitting > SHORTEST:
         fitting = max(0.5 * fitting, SHORTEST)
-    x, y, z = opening.centre
     if fitting > free:
         raise InputError(
-            f"has an opening at ({x:.4g}, {y:.4g}, {z:.4g}) mm that cannot be continued "
-            f"straight by {SHORTEST:g} mm without meeting the rest of the vessel: cut the vessel "
+            f"has an opening at {place(opening.centre)} that cannot be continued straight by "
+            f"{SHORTEST:g} mm without meeting the rest of the vessel: cut the vessel "
             "elsewhere there"
         )
     remarks = surface.remarks
     if fitting < length:
         remarks += (
-            f"the opening at ({x:.4g}, {y:.4g}, {z:.4g}) mm is continued by {fitting:.3g} mm "
+            f"the opening at {place(opening.centre)} is continued by {fitting:.3g} mm "
             f"instead of {length:g} mm, for the vessel itself is in the way",
         )
     end = flat + fitting * opening.normal

@@ -14,6 +14,7 @@ from braidcast.vessels.centreline import as_rows
 from braidcast.vessels.mesh_distance import MeshDistance
 from braidcast.vessels.polyline import Polyline
 from braidcast.vessels.surface_file import read_surface
+from braidcast.vessels.wording import place
 
 Array = NDArray[np.float64]
 
@@ -70,9 +71,9 @@ class ClosedSac:
         """The region inside the surface at ``path``; ``InputError`` if it is none, or open."""
         surface = read_surface(path, units, closed=True)
         if surface.openings:
-            place = ", ".join(f"{x:.2f}" for x in surface.openings[0].centre)
             raise InputError(
-                f"surface = {path} is open at ({place}) mm, must be closed all around the sac"
+                f"surface = {path} is open at {place(surface.openings[0].centre)}, must be closed "
+                "all around the sac"
             )
         return cls(MeshDistance(surface), surface.vertices)
 
