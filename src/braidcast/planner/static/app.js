@@ -146,6 +146,7 @@ class Planner {
     this.compare.show(this.state.compare, this.#lookA()?.all ?? [], this.#rowsOf(seen));
     this.#showStrip(now);
     this.seen = seen;
+    document.body.dataset.ready = this.stdReady ? "all" : "page"; // with standard deviations, or not yet
   }
 
   /** Case A as last looked at; its simulation may have come since. */
@@ -305,11 +306,9 @@ async function open() {
       if (event !== "gone") planner.schedule();
     });
     find("waiting").hidden = true;
-    document.body.dataset.ready = "page";
     await planner.model?.prepareStd();
     planner.stdReady = true;
     planner.schedule();
-    document.body.dataset.ready = "all"; // with standard deviations
   } catch (error) {
     find("waiting").hidden = false;
     write(find("waiting"), `The planner could not start: ${error.message}`);
