@@ -147,7 +147,7 @@ def turned(surface):
 @pytest.mark.parametrize(
     "surface, place",
     [
-        (flipped_patch, r"near \((0.[89]|1.[01]).*, .*, (2.[6-9]|3.[0-4]).*\) mm"),
+        (flipped_patch, r"near \((0\.[89]\d?|1|1\.[01]\d?), .*, (2\.[6-9]\d?|3|3\.[0-4]\d?)\) mm"),
         (lambda: joined(closed(BALL), closed(BALL.translate([1.2, 0, 0]))), r"near \(0\.[3-9]"),
         (lambda: joined(cylinder(1.0, 8.0), bored()), r"near \(-?[01].*\) mm"),
         (lambda: turned(closed(BALL)), "turned inside out"),
