@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import pytest
+from driving import opened
 from playwright.sync_api import Browser, Page, sync_playwright
 from starlette.applications import Starlette
 
@@ -104,3 +105,9 @@ def browser_page(browser: Browser, troubles: list[str]) -> Iterator[Page]:
     yield page
     context.close()
     assert not troubles
+
+
+@pytest.fixture
+def planner(browser_page: Page, server) -> Page:
+    """The page with the default case."""
+    return opened(browser_page, server.url)

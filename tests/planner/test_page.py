@@ -9,6 +9,17 @@ import numpy as np
 import pytest
 import pyvista
 import trimesh
+from driving import (
+    complete,
+    downloaded,
+    opened,
+    readout,
+    reloaded,
+    settled,
+    slide,
+    tables,
+    type_into,
+)
 from playwright.sync_api import Page, expect
 
 from braidcast import Case
@@ -19,70 +30,10 @@ from braidcast.planner.server import application
 from braidcast.surrogate.model_file import load_model
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-READY = 30_000.0  # ms; the standard deviations are prepared on however few cores there are
 SIMULATED = 120_000.0  # ms; a case takes some seconds, the first also compiles and crimps
 
 #: One of every kind of nonsense that a hand or a clipboard puts into a field.
 GARBAGE = ("", " ", "abc", "1e999", "NaN", "-5000", "3 mm", "<b>1</b>", "'; --", "9" * 400)
-
-
-def opened(page: Page, url: str, hash: str = "") -> Page:
-    page.goto(url + hash)
-    page.wait_for_selector("body[data-ready]", timeout=READY)
-    return page
-
-
-def complete(page: Page) -> None:
-    """Wait for the standard deviations, which are prepared behind the usable page."""
-    page.wait_for_selector("body[data-ready=all]", timeout=READY)
-
-
-def reloaded(page: Page) -> None:
-    page.reload()
-    page.wait_for_selector("body[data-ready]", timeout=READY)
-
-
-def readout(page: Page, key: str) -> str:
-    return page.locator(f'[data-key="{key}"]').inner_text()
-
-
-def settled(page: Page) -> None:
-    """Wait until what was changed is shown, and kept in the address."""
-    page.evaluate(
-        """() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() =>
-            setTimeout(done, 400))))"""
-    )
-
-
-def tables(page: Page) -> dict:
-    return page.evaluate("() => planner.state.tables")
-
-
-def slide(page: Page, name: str, value: float, committed: bool = True) -> None:
-    """Move a number's slider as a hand does, by events."""
-    page.evaluate(
-        """([name, value, committed]) => {
-            const typed = document.getElementById(`number-${name}`);
-            const control = typed.closest(".control, .site-control");
-            const slider = control.querySelector("input[type=range]");
-            slider.value = value;
-            slider.dispatchEvent(new Event("input", { bubbles: true }));
-            if (committed) slider.dispatchEvent(new Event("change", { bubbles: true }));
-            return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
-        }""",
-        [name, value, committed],
-    )
-
-
-def type_into(page: Page, name: str, text: str) -> None:
-    page.fill(f"#number-{name}", text)
-    page.press(f"#number-{name}", "Enter")
-
-
-@pytest.fixture
-def planner(browser_page: Page, server) -> Page:
-    """The page with the default case."""
-    return opened(browser_page, server.url)
 
 
 def test_the_page_is_usable(planner: Page) -> None:
@@ -187,7 +138,7 @@ def test_what_is_being_typed_stays(planner: Page) -> None:
 def test_outside_of_the_training_data_is_said(planner: Page) -> None:
     type_into(planner, "aneurysm_diameter", "11")
     banner = planner.locator("[data-banner=outside]")
-    expect(banner).to_contain_text("aneurysm_diameter = 11 mm, trained from 5 to 10 mm")
+    expect(banner).to_contain_text("Aneurysm diameter = 11 mm, trained from 5 to 10 mm")
     expect(banner).to_contain_text("not a prediction")
     type_into(planner, "aneurysm_diameter", "8")
     expect(banner).to_have_count(0)
@@ -365,13 +316,6 @@ def test_a_restarted_server_is_noticed(
     troubles.clear()
 
 
-def downloaded(page: Page, kind: str) -> Path:
-    with page.expect_download() as download:
-        page.click(f"#download-{kind}")
-    assert download.value.suggested_filename == f"success_in_a_gently_curved_vessel.{kind}"
-    return Path(download.value.path())
-
-
 def test_what_is_seen_is_exported(planner: Page, tmp_path: Path) -> None:
     complete(planner)
     slide(planner, "site_eta", 0.45)
@@ -469,6 +413,14 @@ def test_a_vessel_from_a_surface_is_simulated(browser_page: Page, serving) -> No
         assert tables(page)["site"]["eta"] == pytest.approx(20.0 / spare)
         page.click("#simulate")
         expect(page.locator('[data-key="sim-length"]')).to_be_visible(timeout=SIMULATED)
+        # At another site there is no braid until it is simulated.
+        assert page.evaluate("() => planner.pictures[0].view.braid.visible")
+        type_into(page, "site_mm", "5")
+        settled(page)
+        assert not page.evaluate("() => planner.pictures[0].view.braid.visible")
+        expect(page.locator("#legend")).to_be_hidden()
+        page.click("#download-vtp")
+        expect(page.locator("[data-banner=download]")).to_contain_text("no braid yet")
         page.goto("about:blank")
 
 

@@ -4,6 +4,8 @@ import { changed, parse, read, shown } from "./numbers.js";
 
 const COLOURS = ["gap", "std", "departure"];
 const COMPARISONS = ["off", "sides", "ghost"];
+/** Decimals of the numbers in the address. */
+export const DIGITS = 12;
 const PAUSE = 250; // ms; browsers refuse hundreds of history entries in a few seconds
 
 /** State {tables, pinned, colour, compare} → text; `numbers`: the fields that may change, A's with "A.". */
@@ -12,7 +14,7 @@ export function toHash(state, numbers) {
   for (const [prefix, tables] of [["", state.tables], ["A.", state.pinned]]) {
     for (const field of tables ? numbers : []) {
       const value = read(tables, field);
-      if (value !== undefined) parts.set(prefix + field.name, shown(value, 12));
+      if (value !== undefined) parts.set(prefix + field.name, shown(value, DIGITS));
     }
   }
   if (state.colour !== "gap") parts.set("colour", state.colour);
@@ -38,6 +40,7 @@ export function fromHash(hash, start, numbers) {
     } else complaints.push(`“${key.slice(0, 24)}” is nothing this page knows.`);
   }
   if (!state.pinned) state.compare = "off";
+  else if (state.compare === "off") state.compare = "sides"; // a pinned case is never hidden
   return { state, complaints };
 }
 

@@ -11,7 +11,7 @@ import { FileHost, ServerHost } from "./host.js";
 import { legend } from "./legend.js";
 import { Model } from "./model.js";
 import { changed, shownNumbers } from "./numbers.js";
-import { Picture, colouring } from "./picture.js";
+import { Picture, isThere, scaleOf } from "./picture.js";
 import { percent, showRows } from "./readouts.js";
 import { SimulationBox, keyOf } from "./simulation.js";
 import { Looker } from "./situation.js";
@@ -29,6 +29,8 @@ class Planner {
   pictures = []; // of B and, side by side, of A
   stdReady = false;
   seen = null; // the last possible case that was looked at
+  impossible = ""; // why the present one is not
+  scale = null; // of the colours of all pictures
   #pinned = { key: "", look: null };
   #stripKey = "";
 
@@ -57,6 +59,7 @@ class Planner {
   /** Changes the state and shows it with the next frame; committed changes go into the history. */
   change(patch, committed = true) {
     Object.assign(this.state, patch);
+    this.#forgetComplaints();
     if (committed) this.history.commit();
     this.schedule();
   }
@@ -68,8 +71,15 @@ class Planner {
       Object.assign(state, { pinned: null, compare: "off" });
     }
     this.state = state;
+    this.#forgetComplaints();
     banners.set("address", "note", complaints.length ? `The address holds something else than a case: ${complaints[0]} The rest of it is used.` : "");
     this.schedule();
+  }
+
+  /** What was refused, or could not be made, was so before this change. */
+  #forgetComplaints() {
+    for (const control of [this.siteControl, ...this.controls]) control.forget();
+    banners.set("download", "note", "");
   }
 
   schedule() {
@@ -133,8 +143,11 @@ class Planner {
   #show() {
     const { tables } = this.state;
     const now = this.looker.look(tables);
-    banners.set("impossible", "error", now.impossible ? `Impossible: ${now.impossible}. The last possible case is shown in grey.` : "");
-    banners.set("outside", "warning", now.prediction && !now.prediction.inRange ? `Outside of what the model was trained for: ${now.prediction.outOfRange.join("; ")}. A hint, not a prediction.` : "");
+    const a = this.#lookA();
+    this.impossible = now.impossible ?? "";
+    banners.set("impossible", "error", now.impossible ? `Impossible: ${now.impossible}.${this.seen ? " The last possible case is shown in grey." : ""}` : "");
+    this.#warn("outside", a ? "B is outside" : "Outside", now);
+    this.#warn("outside-a", "A is outside", a);
     for (const control of this.controls) control.show(control.field.path.reduce((table, key) => table[key], tables));
     const seen = now.impossible ? this.seen : now;
     if (seen) this.siteControl.show(tables.site.eta, seen.geometry);
@@ -143,10 +156,16 @@ class Planner {
     this.#showVerdict(now);
     if (!now.impossible) showRows(find("readouts"), now.rows);
     this.simulation.show(tables, now.impossible ?? "", now.simulated ?? []);
-    this.compare.show(this.state.compare, this.#lookA()?.all ?? [], this.#rowsOf(seen));
+    this.compare.show(this.state.compare, a?.all ?? [], this.#rowsOf(seen), this.impossible);
     this.#showStrip(now);
     this.seen = seen;
     document.body.dataset.ready = this.stdReady ? "all" : "page"; // with standard deviations, or not yet
+  }
+
+  #warn(name, outside, look) {
+    const { inRange = true, outOfRange } = look?.prediction ?? {};
+    const labelled = (phrase) => this.fields.reduce((text, field) => text.replace(`${field.name} `, `${field.label} `), phrase);
+    banners.set(name, "warning", inRange ? "" : `${outside} of what the model was trained for: ${outOfRange.map(labelled).join("; ")}. A hint, not a prediction.`);
   }
 
   /** Case A as last looked at; its simulation may have come since. */
@@ -162,7 +181,7 @@ class Planner {
   }
 
   #rowsOf(look) {
-    if (!look) return [];
+    if (!look || look.impossible) return [];
     const { prediction } = look;
     const site = ["site", "Proximal end of the crimped stent", `${look.geometry.startArcLength.toFixed(2)} mm`];
     const verdict = prediction ? [["probability", "Probability of success", percent(prediction.successProbability)], ["verdict", "Verdict", prediction.success ? "success" : "failure"]] : [];
@@ -175,24 +194,32 @@ class Planner {
   }
 
   #showPictures(now, seen) {
-    const sides = this.state.compare === "sides";
+    const { compare, colour } = this.state;
+    const sides = compare === "sides";
     const a = this.#lookA();
     this.#arrange(sides);
-    const second = this.state.compare === "ghost" ? a.prediction?.positions ?? a.simulation?.positions : now.prediction && now.simulation?.positions;
-    const names = { ghost: "B in colours; A as the thin second braid", sides: "B" };
-    const caption = names[this.state.compare] ?? (second ? "Prediction in colours; simulation as the thin second braid" : "");
-    write(find("view-b").lastElementChild, caption);
-    this.pictures[0].show(this.#scene(now, second ?? null));
+    const coloured = [seen, sides ? a : null].filter((look) => look?.braid);
+    this.scale = coloured.length ? scaleOf(colour, coloured) : null;
+    const second = compare === "ghost" ? a.braid : now.prediction && now.simulation;
+    this.captions = this.#captions(seen, a, second);
+    this.captions.forEach((text, i) => write(find(["view-b", "view-a"][i]).lastElementChild, text));
+    this.pictures[0].show(this.#scene(now, second?.positions ?? null));
     if (sides) this.pictures[1].show(this.#scene(a, null));
     if (this.refit) this.#fit();
     this.refit = false;
-    if (!seen?.prediction && !seen?.simulation) return;
-    const colours = this.#colours(seen);
-    legend(find("legend"), colours, palette);
-    const [, std, away] = find("colour").options;
-    std.disabled = !seen.prediction?.stdNorm;
-    away.disabled = !seen.departure;
-    find("colour").value = colours.kind;
+    legend(find("legend"), this.scale, palette);
+    for (const option of find("colour").options) option.disabled = option.value !== "gap" && !(this.scale && isThere(option.value, coloured));
+    find("colour").value = this.scale?.kind ?? "gap";
+  }
+
+  /** Of the picture of B and, side by side, of that of A. */
+  #captions(b, a, second) {
+    const missing = (look) => (look && !look.braid ? ", not simulated yet" : "");
+    const { compare } = this.state;
+    if (compare === "sides") return [`B${missing(b)}`, `A${missing(a)}`];
+    if (compare === "off") return [second ? "Prediction in colours; simulation as the thin second braid" : ""];
+    const vessel = b && b.shape.key !== a.shape.key ? "; the vessel is that of B" : "";
+    return [`B in colours${missing(b)}; A as the thin second braid${missing(a)}${vessel}`];
   }
 
   #fit() {
@@ -201,21 +228,15 @@ class Planner {
 
   #scene(look, ghost) {
     if (look.impossible) return { stale: true };
-    const { shape, prediction, simulation, marks } = look;
-    const positions = prediction?.positions ?? simulation?.positions;
-    const braid = positions ? { positions, wires: this.looker.wires, device: this.looker.device } : null;
-    return { vessel: shape.vessel, braid, colours: braid && this.#colours(look), marks, ghost: braid && ghost };
-  }
-
-  #colours({ prediction, simulation, departure }) {
-    return colouring(this.state.colour, { gaps: (prediction ?? simulation).gaps, stdNorm: prediction?.stdNorm, departure });
+    const { shape, braid, marks } = look;
+    const { wires, device } = this.looker;
+    return { vessel: shape.vessel, braid: braid && { positions: braid.positions, values: this.scale.of(look) }, scale: this.scale, wires, device, marks, ghost };
   }
 
   /** One canvas or two; the second is made when it is first needed. */
   #arrange(sides) {
     if (find("view-a").hidden === !sides) return;
     find("view-a").hidden = !sides;
-    write(find("view-a").lastElementChild, "A");
     find("views").classList.toggle("two", sides);
     if (sides && !this.pictures[1]) {
       this.pictures.push(new Picture(find("canvas-a"), this.isDark));
@@ -292,6 +313,7 @@ function fitTogether(views) {
 const AWAY = {
   gone: ["error", "The server is gone. The sliders go on working, for the model is in this page; simulations wait. Trying to reach it …"],
   here: ["", ""],
+  other: ["error", "The server was restarted with another case or another model. Reload this page to open it; shown here is still what it was."],
   restarted: ["note", "The server was restarted. Your case is kept; simulations that were running are lost."],
 };
 
@@ -303,6 +325,7 @@ async function open() {
     globalThis.planner = planner; // for tests and the curious
     host.watch((event) => {
       banners.set("server", ...AWAY[event]);
+      if (event === "other") history.replaceState(null, "", location.pathname); // its numbers are the old case's
       if (event !== "gone") planner.schedule();
     });
     find("waiting").hidden = true;

@@ -2,6 +2,13 @@
 
 import { element, write } from "./elements.js";
 
+/** Rows [key, what, value] of A and of B as rows [key, what, A's value, B's value]; "–" for none. */
+export function paired(rowsA, rowsB) {
+  const keys = new Set(rowsB.map(([key]) => key));
+  const valueOf = (rows, wanted) => rows.find(([key]) => key === wanted)?.[2] ?? "–";
+  return [...rowsB, ...rowsA.filter(([key]) => !keys.has(key))].map(([key, what]) => [key, what, valueOf(rowsA, key), valueOf(rowsB, key)]);
+}
+
 export class CompareBox {
   /** `onPin()`, `onUnpin()`, `onArrange("sides" | "ghost")`, `onSwap()` */
   constructor(root, { onPin, onUnpin, onArrange, onSwap }) {
@@ -16,26 +23,25 @@ export class CompareBox {
     root.append(element("div", { class: "buttons" }, this.pin, this.unpin, this.swap), this.how, this.hint, this.table);
   }
 
-  /** `arrangement`: "off", "sides" or "ghost"; rows [key, what, value] of A and B. */
-  show(arrangement, rowsA, rowsB) {
+  /** `arrangement`: "off", "sides" or "ghost"; rows [key, what, value] of A and B; `impossible`: why
+   * B cannot be pinned, or "". */
+  show(arrangement, rowsA, rowsB, impossible) {
     const pinned = arrangement !== "off";
+    this.pin.disabled = this.swap.disabled = Boolean(impossible);
     for (const part of [this.unpin, this.swap, this.how, this.table]) part.hidden = !pinned;
     write(this.pin, pinned ? "Pin this case as A instead" : "Pin this case as A");
     write(this.hint, pinned ? "B follows the sliders." : "Pins what is shown, then move the sliders to compare.");
     if (!pinned) return;
     this.arrange.value = arrangement;
-    const keys = rowsB.map(([key]) => key).join();
+    const rows = paired(rowsA, rowsB);
+    const keys = rows.map(([key]) => key).join();
     if (this.table.dataset.keys !== keys) {
       this.table.dataset.keys = keys;
       const head = ["", "A", "B"].map((text) => element("th", { scope: "col", text }));
       const row = ([key, what]) => element("tr", {}, element("th", { scope: "row", text: what }), element("td", { "data-a": key }), element("td", { "data-b": key }));
-      this.table.replaceChildren(element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rowsB.map(row)));
+      this.table.replaceChildren(element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows.map(row)));
     }
-    for (const [side, rows] of [["a", rowsA], ["b", rowsB]]) {
-      for (const [key, , value] of rows) {
-        const cell = this.table.querySelector(`[data-${side}="${key}"]`);
-        if (cell) write(cell, value);
-      }
-    }
+    const cells = this.table.querySelectorAll("td");
+    rows.forEach(([, , a, b], i) => [a, b].forEach((value, k) => write(cells[2 * i + k], value)));
   }
 }

@@ -27,17 +27,14 @@ export class NumberControl {
     this.slider = element("input", { type: "range", min: low, max: high, step, "aria-label": `${field.label}${unit}, slider` });
     this.typed = typedField(id, `${id}-note`);
     this.note = element("p", { class: "note", id: `${id}-note`, role: "status" });
-    const emit = (committed) => {
-      this.#complain("");
-      onChange(Number(this.slider.value), committed);
-    };
+    const emit = (committed) => onChange(Number(this.slider.value), committed);
     this.slider.addEventListener("input", () => emit(false));
     this.slider.addEventListener("change", () => emit(true));
     this.typed.addEventListener("change", () => {
       const { value, complaint } = parse(this.typed.value, field);
-      if (complaint) this.typed.value = shown(this.value);
-      this.#complain(complaint ? `${complaint} Kept ${shown(this.value)}${field.unit && ` ${field.unit}`}.` : "");
-      if (!complaint) onChange(value, true);
+      if (!complaint) return onChange(value, true);
+      this.typed.value = shown(this.value);
+      this.#complain(`${complaint} Kept ${shown(this.value)}${field.unit && ` ${field.unit}`}.`);
     });
     this.root = element("div", { class: "control" },
       element("label", { for: id, text: field.label }), this.slider, this.typed,
@@ -52,6 +49,11 @@ export class NumberControl {
     const outside = this.field.trained && (value < low - 1e-9 || value > high + 1e-9);
     this.root.classList.toggle("outside", outside);
     if (!this.complaint) write(this.note, outside ? `Trained from ${low} to ${high}${this.field.unit && ` ${this.field.unit}`}.` : "");
+  }
+
+  /** Complaints are of what was typed last. */
+  forget() {
+    if (this.complaint) this.#complain("");
   }
 
   #complain(text) {
@@ -72,18 +74,18 @@ export class SiteControl {
     this.typed = typedField("number-site_eta", "site-note");
     this.millimetres = typedField("number-site_mm", "site-note");
     this.ends = element("span", { id: "site-ends" });
-    this.slider.addEventListener("input", () => this.#emit(Number(this.slider.value), false, onChange));
-    this.slider.addEventListener("change", () => this.#emit(Number(this.slider.value), true, onChange));
+    this.slider.addEventListener("input", () => onChange(Number(this.slider.value), false));
+    this.slider.addEventListener("change", () => onChange(Number(this.slider.value), true));
     this.typed.addEventListener("change", () => {
       const { value, complaint } = parse(this.typed.value, field);
-      if (complaint) this.#refuse(`${complaint} Kept η ${shown(this.eta)}.`);
-      else this.#emit(value, true, onChange);
+      if (complaint) this.#refuse(this.typed, `${complaint} Kept η ${shown(this.eta)}.`);
+      else onChange(value, true);
     });
     this.millimetres.addEventListener("change", () => {
       const rule = `from 0 to ${this.spare.toFixed(2)} mm`;
       const { value, complaint } = parse(this.millimetres.value, { label: "Proximal end", low: 0, high: this.spare + 0.005, rule });
-      if (complaint) this.#refuse(`${complaint} Kept ${(this.eta * this.spare).toFixed(2)} mm.`);
-      else this.#emit(Math.min(1, value / this.spare), true, onChange);
+      if (complaint) this.#refuse(this.millimetres, `${complaint} Kept ${(this.eta * this.spare).toFixed(2)} mm.`);
+      else onChange(Math.min(1, value / this.spare), true);
     });
     const eta = [element("label", { for: "number-site_eta", text: "Site η" }), this.typed];
     this.root = element("div", { class: "site-control" }, this.slider,
@@ -108,13 +110,15 @@ export class SiteControl {
     display(this.millimetres, (this.eta * this.spare).toFixed(2));
   }
 
-  #emit(eta, committed, onChange) {
+  forget() {
     write(this.note, "");
-    onChange(eta, committed);
+    for (const field of [this.typed, this.millimetres]) field.removeAttribute("aria-invalid");
   }
 
-  #refuse(text) {
+  #refuse(field, text) {
+    this.forget();
     write(this.note, text);
+    field.setAttribute("aria-invalid", true);
     this.#display();
   }
 }

@@ -5,6 +5,9 @@ import { unpack } from "./model.js";
 const POLL = 300; // ms between looks at a running simulation
 const HEARTBEAT = 2000; // ms between looks whether the server is there
 
+/** Simulations of this visit whose results are kept; a braid and its gaps are 0.1 MB. */
+export const KEPT = 10;
+
 /** Why a file cannot simulate. */
 export const NO_SERVER = "This page is a file without a server, so it cannot simulate: open the case with “braidcast planner CASE.toml”.";
 
@@ -19,8 +22,9 @@ const randomName = () => Array.from(crypto.getRandomValues(new Uint8Array(16)), 
 export class ServerHost {
   kind = "server";
   #session = sessionStorage.getItem("session") ?? randomName();
-  #job = null;
+  #job = null; // {cancelled, cancel()} of the simulation that is followed
   #started = null;
+  #opened = "";
 
   constructor() {
     sessionStorage.setItem("session", this.#session);
@@ -28,7 +32,9 @@ export class ServerHost {
 
   /** Tables, model's name and card, and the surface if the vessel has one. */
   async start() {
-    return (await this.#ask("api/start")).json();
+    this.#started = await this.#identity();
+    this.#opened = await this.#startText();
+    return JSON.parse(this.#opened);
   }
 
   async model() {
@@ -37,29 +43,52 @@ export class ServerHost {
 
   /** Deploys the case by finite elements; onProgress({state, position, stage, fraction}). */
   async simulate(tables, onProgress) {
-    const answer = await this.#ask("api/jobs", { method: "POST", body: JSON.stringify({ case: tables }), headers: { "Content-Type": "application/json" } });
-    const { id } = await answer.json();
-    sessionStorage.setItem("job", JSON.stringify({ id, tables }));
-    return this.#follow(id, onProgress);
+    const options = { method: "POST", body: JSON.stringify({ case: tables }), headers: { "Content-Type": "application/json" } };
+    this.#job = cancellable();
+    const { id } = await (await this.#patiently("api/jobs", onProgress, options)).json();
+    this.#keep([...this.kept, { id, tables }].slice(-KEPT));
+    return this.follow(id, onProgress, this.#job);
   }
 
-  /** The simulation that ran when the page was left: {tables, result: promise}, or null. */
-  resume(onProgress) {
-    const kept = JSON.parse(sessionStorage.getItem("job") ?? "null");
-    return kept && { tables: kept.tables, result: this.#follow(kept.id, onProgress) };
+  /** Simulations of this visit, also of before a reload: [{id, tables}]. */
+  get kept() {
+    return JSON.parse(sessionStorage.getItem("jobs") ?? "[]");
   }
 
-  async cancel() {
-    if (this.#job) await this.#ask(`api/jobs/${this.#job}`, { method: "DELETE" }).catch(() => {});
+  /** The result of a simulation, as soon as it is there. */
+  async follow(id, onProgress, job = cancellable()) {
+    this.#job = job;
+    try {
+      for (;;) {
+        const state = await (await this.#patiently(`api/jobs/${id}`, onProgress)).json();
+        onProgress(state);
+        if (state.state === "done") break;
+        if (state.state === "cancelled") throw new Cancelled();
+        if (state.state === "failed") throw new Error(state.message);
+        await this.#wait(POLL);
+      }
+      const { header, arrays } = unpack(await (await this.#patiently(`api/jobs/${id}/result`, onProgress)).arrayBuffer());
+      return { ...header, ...arrays };
+    } catch (error) {
+      this.#keep(this.kept.filter((one) => one.id !== id));
+      if (error instanceof Cancelled) this.#ask(`api/jobs/${id}`, { method: "DELETE" }).catch(() => {});
+      if (error.status === 404) throw new Error("The simulation is lost: the server was restarted. Start it again.");
+      throw error;
+    }
   }
 
-  /** Calls back with "here", "gone" or "restarted" whenever that changes. */
+  /** Ends what is followed, whether or not the server is there to hear of it. */
+  cancel() {
+    this.#job.cancel();
+  }
+
+  /** Calls back whenever that changes with "here", "gone", "restarted" or, with another case, "other". */
   async watch(onChange) {
     let here = true;
     for (;;) {
       try {
-        const { started } = await (await this.#ask("api/alive")).json();
-        if (this.#started !== null && started !== this.#started) onChange("restarted");
+        const started = await this.#identity();
+        if (started !== this.#started) onChange((await this.#startText()) === this.#opened ? "restarted" : "other");
         else if (!here) onChange("here");
         [this.#started, here] = [started, true];
       } catch {
@@ -70,38 +99,34 @@ export class ServerHost {
     }
   }
 
-  async #follow(id, onProgress) {
-    this.#job = id;
-    try {
-      for (;;) {
-        const job = await this.#poll(id);
-        onProgress(job);
-        if (job.state === "done") break;
-        if (job.state === "cancelled") throw new Cancelled();
-        if (job.state === "failed") throw new Error(job.message);
-        await pause(POLL);
+  #keep(jobs) {
+    sessionStorage.setItem("jobs", JSON.stringify(jobs));
+  }
+
+  #wait(milliseconds) {
+    return Promise.race([pause(milliseconds), this.#job.cancelled]);
+  }
+
+  /** Asks, and where the server is gone for a while asks again. */
+  async #patiently(path, onProgress, options) {
+    for (;;) {
+      try {
+        return await this.#ask(path, options);
+      } catch (error) {
+        if (error.status) throw error;
+        onProgress({ state: "gone" });
+        await this.#wait(HEARTBEAT);
       }
-      const { header, arrays } = unpack(await (await this.#ask(`api/jobs/${id}/result`)).arrayBuffer());
-      return { ...header, ...arrays };
-    } catch (error) {
-      sessionStorage.removeItem("job");
-      throw error;
-    } finally {
-      this.#job = null;
     }
   }
 
-  /** The state of a job; waits where the server is gone for a while. */
-  async #poll(id) {
-    for (;;) {
-      try {
-        return await (await this.#ask(`api/jobs/${id}`)).json();
-      } catch (error) {
-        if (error.status === 404) throw new Error("The simulation is lost: the server was restarted. Start it again.");
-        if (error.status) throw error;
-        await pause(HEARTBEAT);
-      }
-    }
+  /** Of this run of the server. */
+  async #identity() {
+    return (await (await this.#ask("api/alive")).json()).started;
+  }
+
+  async #startText() {
+    return (await this.#ask("api/start")).text();
   }
 
   async #ask(path, options = {}) {
@@ -112,9 +137,18 @@ export class ServerHost {
   }
 }
 
+/** What is rejected with Cancelled once `cancel()` is called. */
+function cancellable() {
+  let cancel;
+  const cancelled = new Promise((_, reject) => (cancel = () => reject(new Cancelled())));
+  cancelled.catch(() => {}); // whoever waits for it hears of it
+  return { cancelled, cancel };
+}
+
 /** The exported page: its first answers and its model, gzipped in base64, are elements of it. */
 export class FileHost {
   kind = "file";
+  kept = [];
   #start;
   #packed;
 
@@ -138,10 +172,6 @@ export class FileHost {
     throw new Error(NO_SERVER);
   }
 
-  resume() {
-    return null;
-  }
-
-  async cancel() {}
+  cancel() {}
   watch() {}
 }

@@ -7,7 +7,6 @@ const FARTHEST = 1;
 
 export class Picture {
   #vessel = "";
-  #braid = null;
 
   constructor(canvas, dark) {
     this.canvas = canvas;
@@ -16,37 +15,46 @@ export class Picture {
 
   /**
    * `vessel`: as View.setVessel takes it, with `key`, one text per shape; `braid`: {positions,
-   * device, wires} or null; `colours`: {values, range, palette} or null; `marks`, `ghost` as View's.
+   * values} or null; `scale`: {range, palette}; `wires` of `device`; `marks`, `ghost` as View's.
    */
-  show({ vessel, braid, colours, marks, ghost, stale }) {
+  show({ vessel, braid, scale, wires, device, marks, ghost, stale }) {
     this.canvas.classList.toggle("stale", Boolean(stale));
     if (stale) return;
     if (vessel.key !== this.#vessel) this.view.setVessel(vessel);
-    if (braid && !this.#braid) this.view.setBraid(braid.wires, braid.device.wire_radius, braid.device.segments);
+    if ((braid || ghost) && !this.view.braid) this.view.setBraid(wires, device.wire_radius, device.segments);
     if (braid) {
       this.view.setPositions(braid.positions);
-      this.view.setValues(colours.values, colours.range, colours.palette);
-    }
+      this.view.setValues(braid.values, scale.range, scale.palette);
+    } else this.view.hideBraid();
     this.view.setMarks(marks);
     this.view.setGhost(ghost);
     if (!this.#vessel) this.view.fit();
     this.#vessel = vessel.key;
-    this.#braid = braid ?? this.#braid;
     this.view.render();
   }
 }
 
-/** How nodes get their colour: {kind, values, range, palette, title}; values (N) mm. */
-export function colouring(kind, { gaps, stdNorm, departure }) {
-  if (kind === "departure" && departure) return { kind, values: departure, range: [0, ceiling(departure)], palette: "cividis", title: "departure from the simulation, mm" };
-  if (kind === "std" && stdNorm) return { kind, values: stdNorm, range: [0, ceiling(stdNorm)], palette: "cividis", title: "standard deviation, mm" };
-  return { kind: "gap", values: gaps, range: [0, FARTHEST], palette: "viridis", title: "distance to the wall, mm" };
+/** What nodes may be coloured by; `of(look)`: values (N) mm, or nothing where a case has none. */
+const QUANTITIES = {
+  departure: { of: ({ departure }) => departure, palette: "cividis", title: "departure from the simulation, mm" },
+  std: { of: ({ prediction }) => prediction?.stdNorm, palette: "cividis", title: "standard deviation, mm" },
+  gap: { of: ({ braid }) => braid?.gaps, palette: "viridis", title: "distance to the wall, mm" },
+};
+
+/** Whether all the looks have such values. */
+export const isThere = (kind, looks) => looks.every((look) => QUANTITIES[kind].of(look));
+
+/** One scale of colours for all the looks that are shown: {kind, of, range, palette, title}. */
+export function scaleOf(wanted, looks) {
+  const kind = isThere(wanted, looks) ? wanted : "gap";
+  const quantity = QUANTITIES[kind];
+  return { kind, ...quantity, range: [0, kind === "gap" ? FARTHEST : ceiling(looks.map(quantity.of))] };
 }
 
-/** The next of 1, 2, 5, 10 … × 10^k above all values, so that the scale does not change at every move. */
-function ceiling(values) {
+/** The next of 1, 2, 5, 10 … × 10^k above all values of all fields, so that the scale does not change at every move. */
+function ceiling(fields) {
   let largest = 1e-4;
-  for (const value of values) if (value > largest) largest = value;
+  for (const values of fields) for (const value of values) if (value > largest) largest = value;
   const power = 10 ** Math.floor(Math.log10(largest));
   return [1, 2, 5, 10].map((step) => step * power).find((step) => step >= largest);
 }

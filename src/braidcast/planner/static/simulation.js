@@ -1,14 +1,16 @@
 /** “Simulate this case”: progress, cancelling, and the results of this visit, each with its case. */
 
+import { DIGITS } from "./address.js";
 import { element, write } from "./elements.js";
-import { Cancelled, NO_SERVER } from "./host.js";
+import { Cancelled, KEPT, NO_SERVER } from "./host.js";
+import { shown } from "./numbers.js";
 import { showRows } from "./readouts.js";
 
-const KEPT = 10; // results in memory; a braid and its gaps are 0.1 MB
-
-/** One text for one case, so that a result finds its case again. */
-export const keyOf = (tables) => JSON.stringify(tables, (_, value) =>
-  value && typeof value === "object" && !Array.isArray(value) ? Object.fromEntries(Object.entries(value).sort(([a], [b]) => (a < b ? -1 : 1))) : value);
+/** One text for one case, so that a result finds its case again; numbers as the address keeps them. */
+export const keyOf = (tables) => JSON.stringify(tables, (_, value) => {
+  if (typeof value === "number") return shown(value, DIGITS);
+  return value && typeof value === "object" && !Array.isArray(value) ? Object.fromEntries(Object.entries(value).sort(([a], [b]) => (a < b ? -1 : 1))) : value;
+});
 
 export class SimulationBox {
   #results = new Map();
@@ -29,8 +31,14 @@ export class SimulationBox {
     this.go = element("button", { type: "button", text: "Show that case", onclick: () => onGo(this.#other().tables) });
     this.rows = element("dl", { id: "simulation-rows" });
     root.append(element("div", { class: "buttons" }, this.start), this.progress, this.message, this.other, this.go, this.rows);
-    const left = host.resume((job) => this.#progress(job));
-    if (left) this.#follow(left.tables, left.result);
+    this.#resume();
+  }
+
+  /** The simulations of before a reload, one after the other: most are done. */
+  async #resume() {
+    for (const { id, tables } of this.host.kept) {
+      await this.#follow(tables, () => this.host.follow(id, (job) => this.#progress(job)));
+    }
   }
 
   /** The result for exactly this case, or undefined. */
@@ -59,15 +67,15 @@ export class SimulationBox {
 
   #run(tables) {
     const copy = structuredClone(tables);
-    return this.#follow(copy, this.host.simulate(copy, (job) => this.#progress(job)));
+    this.#message = "";
+    return this.#follow(copy, () => this.host.simulate(copy, (job) => this.#progress(job)));
   }
 
-  async #follow(tables, result) {
+  async #follow(tables, simulated) {
     this.#running = { key: keyOf(tables), tables };
-    this.#message = "";
     this.#progress({ state: "queued" });
     try {
-      const done = await result;
+      const done = await simulated();
       this.#results.set(keyOf(tables), { ...done, key: keyOf(tables), tables });
       if (this.#results.size > KEPT) this.#results.delete(this.#results.keys().next().value);
     } catch (error) {
@@ -80,8 +88,9 @@ export class SimulationBox {
   #progress({ state, position, stage, fraction }) {
     if (fraction > 0) this.bar.value = fraction;
     else this.bar.removeAttribute("value");
+    const started = `${stage || "starting"}${fraction > 0 ? `, ${Math.round(100 * fraction)} %` : ""}`;
     const ahead = position > 0 ? `waiting for ${position} other${position > 1 ? "s" : ""}` : "starting";
-    write(this.stage, state === "queued" ? ahead : `${stage ?? "starting"}${fraction > 0 ? `, ${Math.round(100 * fraction)} %` : ""}`);
+    write(this.stage, { queued: ahead, gone: "waiting for the server" }[state] ?? started);
     if (state === "queued" || !this.progress.dataset.shown) this.onChange();
     this.progress.dataset.shown = this.#running ? "yes" : "";
   }

@@ -19,8 +19,8 @@ export class Looker {
   }
 
   /**
-   * {impossible} with a sentence, or {geometry, shape, prediction, simulation, departure, marks,
-   * rows, simulated}: rows of the prediction and of the simulation.
+   * {impossible} with a sentence, or {geometry, shape, prediction, simulation, braid, departure,
+   * marks, rows, simulated}: `braid` is the prediction or, without one, the simulation; rows of both.
    */
   look(tables) {
     const impossible = this.start.surface ? null : complaint(tables, this.device);
@@ -34,7 +34,7 @@ export class Looker {
     const away = prediction && simulation ? departure(prediction.positions, simulation.positions) : null;
     const { along, neck } = shape;
     return {
-      impossible, geometry: lengths, shape, prediction, simulation, departure: away,
+      impossible, geometry: lengths, shape, prediction, simulation, braid: prediction ?? simulation, departure: away,
       marks: this.#marks(tables, lengths, shape),
       rows: prediction ? predictionRows(prediction, along, neck, this.device, took) : [],
       simulated: simulation ? simulationRows(simulation, away, along, neck, this.device) : [],

@@ -86,6 +86,12 @@ export class View {
     this.render();
   }
 
+  /** No braid, until it is moved again. */
+  hideBraid() {
+    if (this.braid) this.braid.visible = false;
+    this.render();
+  }
+
   /** Colours by values (N) between [low, high] of the palette "viridis" or "cividis"; null: plain. */
   setValues(values, range, palette) {
     this.braid.setValues(values, range, palette, this.order);
