@@ -143,6 +143,12 @@ def test_sites(parametric: Case, tables: dict[str, Any], site: dict, start: floa
     assert case.eta == pytest.approx(case.start_arc_length / case.spare_length)
 
 
+def test_a_point_far_from_the_vessel_is_no_site(tables: dict[str, Any]) -> None:
+    for given in (tables, {"vessel": {"P1": [0.0, 15.0, 20.0], "diameter": 3.0}}):
+        with pytest.raises(InputError, match=r"^site\.point = .* must be at most .* mm from it$"):
+            Case.from_dict(given | {"site": {"point": [40.0, 7.5, 20.0]}})
+
+
 @pytest.mark.parametrize(
     ("field", "value", "says"),
     [
@@ -161,9 +167,11 @@ def test_sites(parametric: Case, tables: dict[str, Any], site: dict, start: floa
         ("aneurysm", {"neck": [0.0, 7.5, 20.0], "neck_radius": 2.0}, "must be from 0.75"),
         ("aneurysm", {"neck": [0.0, 70.0, 20.0], "neck_radius": 2.0}, "aneurysm.neck = "),
         ("aneurysm", {"diameter": 80.0, "centre": [0.0, 9.0, 20.0]}, "must be the sac alone"),
+        ("aneurysm.neck_fillet", 0.9, "must be left out in one from a surface"),
+        ("aneurysm", {"neck": [1.5, 2.7, 4.0], "neck_radius": 2.0}, "must be where the wall"),
         ("device.length", 40.0, "device.length = 40 mm gives a stent of"),
         ("device.radius", 1.2, "in place"),
-        ("site.crimped_radius", 1.48, "must leave more than 1.508 mm, the crimped stent and a"),
+        ("site.crimped_radius", 1.48, "must be below 1.471 mm, or the stent and a wire do not fit"),
         ("site.point", [0.0, 7.5, 20.0], "site.eta and site.point: 2 given, must be exactly one"),
     ],
 )

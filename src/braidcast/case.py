@@ -145,6 +145,11 @@ class Case(Table):
             raise InputError("vessel.surface is missing, must be the name of a surface's file")
         return self._loaded.with_aneurysm(self._region())
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was noticed, and mended, while the vessel's files were read; a sentence each."""
+        return self._loaded.remarks if isinstance(self.vessel, VesselFile) else ()
+
     @cached_property
     def vessel_geometry(self) -> SaccularVessel | SurfaceVessel:
         """The lumen: tube and, if there is one, aneurysm; or that of the surface."""
@@ -189,6 +194,11 @@ class Case(Table):
                 raise InputError(
                     f"aneurysm.protrusion = {self.aneurysm.protrusion} is for a vessel about a "
                     "Bézier curve, must be centre in one from a surface"
+                )
+            if self.aneurysm.neck_fillet != Aneurysm.model_fields["neck_fillet"].default:
+                raise InputError(
+                    f"aneurysm.neck_fillet = {self.aneurysm.neck_fillet} is for a vessel about a "
+                    "Bézier curve, must be left out in one from a surface, whose neck is as it is"
                 )
             return Sphere(np.array(self.aneurysm.centre), self.aneurysm.diameter / 2.0)
         if self.aneurysm is None:

@@ -14,6 +14,7 @@ from braidcast.vessels.wording import place
 if TYPE_CHECKING:
     from braidcast.case import Case
     from braidcast.devices import Braid
+    from braidcast.vessels.sacs import Sac
     from braidcast.vessels.surface_vessel import SurfaceVessel
 
 #: Length of vessel, mm, that the crimped device leaves free at the least.
@@ -21,6 +22,12 @@ MARGIN = 0.5
 
 #: Distance between places along the centreline that are looked at, mm.
 _STEP = 0.1
+
+#: A site's point lies within so many lumen radii of the centreline, or about the sac.
+_MOST_RADII = 3.0
+
+#: A sac's lumen reaches beyond the parent vessel by more than this share of its radius, and mm.
+_BULGE = (0.1, 0.1)
 
 
 def check(case: Case) -> None:
@@ -94,6 +101,8 @@ def _device_fits_along(case: Case) -> None:
             f"the vessel's centreline is {length:.4g} mm long and {MARGIN} mm stay free"
         )
     if 0.0 <= start <= spare:
+        if case.site.point is not None:
+            _point_is_beside(case, np.array(case.site.point))
         return
     site, far = case.site, spare + case.crimped_length
     if site.proximal_end_mm is not None:
@@ -112,6 +121,23 @@ def _device_fits_along(case: Case) -> None:
     )
 
 
+def _point_is_beside(case: Case, point: np.ndarray) -> None:
+    away, along = (float(value[0]) for value in case.centreline.closest(point))
+    sac = case.vessel_geometry.aneurysm
+    if isinstance(case.vessel, Vessel):
+        lumen = case.vessel_radius
+    else:
+        lumen = float(case.surface_geometry.centreline.lumen_radius(along)[0])
+    most = _MOST_RADII * lumen
+    if sac is not None:
+        most = max(most, float(case.centreline.closest(sac.centre)[0][0]) + sac.radius)
+    if away > most:
+        raise InputError(
+            f"site.point = {list(point.tolist())} is {away:.4g} mm from the vessel's centreline, "
+            f"must be at most {most:.4g} mm from it"
+        )
+
+
 def _device_fits_across_surface(case: Case, vessel: SurfaceVessel) -> None:
     line, start = vessel.centreline, case.start_arc_length
     along = np.arange(start, start + case.crimped_length + _STEP, _STEP)
@@ -120,6 +146,12 @@ def _device_fits_across_surface(case: Case, vessel: SurfaceVessel) -> None:
     least, most = least_radius(case.braid, case.crimped_radius), most_radius(case.braid)
     narrowest = int(room.argmin())
     if room[narrowest] <= least:
+        if case.site.crimped_radius is not None:
+            raise InputError(
+                f"site.crimped_radius = {case.site.crimped_radius:.4g} mm must be below "
+                f"{room[narrowest] - 2.0 * case.braid.wire_radius:.4g} mm, or the stent and a wire "
+                f"do not fit at {place(places[narrowest])}"
+            )
         raise InputError(
             f"vessel.surface = {vessel.name} leaves {room[narrowest]:.4g} mm about the centreline "
             f"at {along[narrowest]:.4g} mm of it, {place(places[narrowest])}, must leave more "
@@ -165,6 +197,28 @@ def _sac_meets_vessel(case: Case, vessel: SurfaceVessel) -> None:
         raise InputError(
             f"aneurysm.{field} holds {held:.0%} of the vessel's centreline, must be the sac alone"
         )
+    if not _bulges(vessel, sac):
+        raise InputError(
+            f"aneurysm.{field} holds no lumen beyond the parent vessel, of {lumen:.4g} mm radius "
+            "there, must be where the wall bulges out"
+        )
+
+
+def _bulges(vessel: SurfaceVessel, sac: Sac) -> bool:
+    """Whether some of the lumen lies in the sac and clearly beyond the parent vessel."""
+    shares = np.linspace(-1.0, 1.0, 25)
+    ball = np.stack(np.meshgrid(shares, shares, shares), axis=-1).reshape(-1, 3)
+    points = sac.centre + sac.radius * ball[np.linalg.norm(ball, axis=1) <= 1.0]
+    points = points[sac.depth(points) > 0.0]
+    points = points[vessel.distance(points) < 0.0] if len(points) else points
+    if len(points) == 0:
+        return False
+    _, along = vessel.centreline.closest(points)
+    share, length = _BULGE
+    beyond = share * vessel.centreline.lumen_radius(along) + length
+    # Beyond an end of the centreline there is no parent vessel to be beyond of.
+    beside = (along > 0.0) & (along < vessel.centreline.length)
+    return bool((beside & (vessel.parent_distance(points) > beyond)).any())
 
 
 def _aneurysm_is_saccular(case: Case) -> None:

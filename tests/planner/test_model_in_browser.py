@@ -236,6 +236,7 @@ IMPOSSIBLE: list[dict[str, dict[str, Any]]] = [
     {"site": {"eta": None, "proximal_end_mm": 45}},
     {"site": {"eta": None, "distal_end_mm": 3.5}},
     {"site": {"eta": None, "point": [0, 0, -5]}},
+    {"site": {"eta": None, "point": [26.0, 10.0, 25.0]}},
     {"vessel": {"P1": [0, 15, 25]}, "aneurysm": {"protrusion": None, "centre": [0.0, 8.0, 25.0]}},
     {"aneurysm": {"protrusion": None, "centre": [0.0, 40.0, 25.0]}},
     {"aneurysm": {"protrusion": None, "centre": [0.0, 4.0, 0.5]}},

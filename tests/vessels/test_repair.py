@@ -1,5 +1,6 @@
 """Damaged surfaces are mended, with a remark, or refused, with a place; see braidcast.vessels."""
 
+import manifold3d
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -235,6 +236,28 @@ def test_crumb_is_left_out(tube):
     assert surface.remarks == (
         "1 loose piece of 1 triangle was left out, the largest around (9.17, 0.17, 0) mm",
     )
+
+
+@pytest.mark.parametrize(
+    "centre, radius, match",
+    [
+        ([0.0, 1.0, 5.0], 0.8, "passes through its wall at"),
+        ([0.0, 0.0, 5.0], 0.8, "loose pieces up to 1.6 mm wide in its lumen about"),
+        ([0.0, 0.0, 5.0], 0.1, None),
+        ([0.0, 8.0, 5.0], 0.8, None),
+    ],
+    ids=["sac of its own", "body", "crumb inside", "crumb outside"],
+)
+def test_only_what_changes_nothing_is_a_crumb(tube, centre, radius, match):
+    ball = manifold3d.Manifold.sphere(radius, 24).translate(centre).to_mesh()
+    vertices, triangles = tube(length=10.0, facets=48, rings=21)
+    both = np.vstack([vertices, ball.vert_properties[:, :3]])
+    faces = np.vstack([triangles, ball.tri_verts.astype(np.int64) + len(vertices)])
+    if match:
+        with pytest.raises(InputError, match=match):
+            repaired(both, faces)
+    else:
+        assert "loose piece" in repaired(both, faces).remarks[0]
 
 
 def test_second_vessel_is_refused(tube):

@@ -83,7 +83,36 @@ def test_what_the_grid_refuses_names_the_file(straight):
 
 @pytest.mark.parametrize("radius", [15.0, 0.15])
 def test_radii_of_another_unit_are_refused(straight, radius):
-    refused(source(straight, centreline=line(radius)), "centreline = line.csv has a largest radius")
+    refused(source(straight, centreline=line(radius)), "centreline = line.csv has radii of")
+
+
+@pytest.mark.parametrize("factor", [0.4, 2.0])
+def test_diameters_are_no_radii(straight, factor):
+    refused(source(straight, centreline=line(1.5 * factor)), "centreline = line.csv has radii of")
+
+
+def test_radii_of_one_place_are_those_of_the_wall_there(straight):
+    places = np.linspace(0.0, 10.0, 21)
+    rows = np.column_stack([0 * places, 0 * places, places, np.linspace(0.4, 4.0, 21)])
+    np.savetxt("line.csv", rows, delimiter=",", header="x,y,z,radius", comments="")
+    refused(source(straight, centreline="line.csv"), "centreline = line.csv has radii of 0.4 to 4")
+
+
+def test_a_centreline_off_the_middle_is_moved_there(straight):
+    places = np.linspace(0.0, 10.0, 21)
+    rows = np.column_stack([0 * places + 0.5, 0 * places, places])
+    np.savetxt("line.csv", rows, delimiter=",", header="x,y,z", comments="")
+    vessel = load_vessel(source(straight, centreline="line.csv"))
+    along = np.linspace(0.0, vessel.centreline.length, 30)
+    assert np.abs(vessel.centreline.at_arc_length(along)[:, :2]).max() < 0.02
+    assert vessel.centreline.lumen_radius(along) == pytest.approx(1.5, abs=0.03)
+    assert any("up to 0.5" in remark and "moved there" in remark for remark in vessel.remarks)
+
+
+def test_a_centreline_ends_where_the_vessel_does(straight):
+    vessel = load_vessel(source(straight, centreline=line(stop=14.0)))
+    assert vessel.centreline.length == pytest.approx(10.0, abs=0.25)
+    assert any("beyond the open ends and was cut" in remark for remark in vessel.remarks)
 
 
 def test_a_centreline_that_leaves_the_lumen_is_refused(tube):

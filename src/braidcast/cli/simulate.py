@@ -48,6 +48,8 @@ def simulate(
 
         with bars("surface", delay=1.0) as progress:
             given = Case.from_toml(case, progress)
+        for remark in given.remarks:
+            say(remark)
         folder = f"{case.stem}_deployed" if output is None else output
         check_folder(folder)
 

@@ -66,8 +66,23 @@ def find_centreline(
         raise InputError(f"ends = {place(ends[0])} and {place(ends[1])}: {error}") from None
 
 
+def centred(distance: Distance, line: Polyline) -> Polyline:
+    """A line through the lumen moved to its middle, with the radii of the tube around it.
+
+    ``InputError`` if the result is doubtful, as that of ``find_centreline``.
+    """
+    places = line.at_arc_length(np.linspace(0.0, line.length, max(8, int(line.length / 0.25))))
+    ends = places[[0, -1]]
+    return _settled(distance, places, ends, np.maximum(-distance(ends), 0.1))
+
+
 def _found(distance: Distance, bounds: Array, ends: Array, given: Array | None) -> Polyline:
     path, radii = lumen_path(distance, bounds, ends, given)
+    return _settled(distance, path, ends, radii)
+
+
+def _settled(distance: Distance, path: Array, ends: Array, radii: Array) -> Polyline:
+    """The middle of the tube about a path (n, 3), between ends (2, 3) with rough radii (2,)."""
     typical = float(radii.mean())
     apart = float(np.linalg.norm(ends[1] - ends[0]))
     if apart < 2.0 * typical or len(path) < 4:

@@ -21,8 +21,8 @@ from braidcast.vessels.wording import counted, place, was
 CRUMB = 0.2
 
 
-def largest_piece(vertices: Array, triangles: IntArray) -> tuple[IntArray, list[str]]:
-    """The triangles of the piece with the largest area, and a remark on those left out.
+def largest_piece(vertices: Array, triangles: IntArray) -> tuple[IntArray, IntArray, list[str]]:
+    """The triangles of the piece with the largest area, those left out, and a remark on them.
 
     ``InputError`` if another has more than a fifth of its area.
     """
@@ -33,7 +33,7 @@ def largest_piece(vertices: Array, triangles: IntArray) -> tuple[IntArray, list[
     pieces, label = connected_components(coo_array(links, shape=(m + e, m + e)), directed=False)
     label = label[:m]
     if pieces == 1:
-        return triangles, []
+        return triangles, triangles[:0], []
     size = np.linalg.norm(area_vectors(vertices, triangles), axis=1)
     area = np.bincount(label, size, pieces)
     order = np.argsort(-area, kind="stable")
@@ -50,7 +50,7 @@ def largest_piece(vertices: Array, triangles: IntArray) -> tuple[IntArray, list[
         f"{counted(crumbs, 'loose piece')} of {counted(left_out, 'triangle')} {was(crumbs)} "
         f"left out, the largest around {where}"
     )
-    return triangles[label == order[0]], [remark]
+    return triangles[label == order[0]], triangles[label != order[0]], [remark]
 
 
 def oriented(vertices: Array, triangles: IntArray) -> tuple[IntArray, list[str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from braidcast.vessels.crumbs import refuse_serious
 from braidcast.vessels.edges import Array, IntArray
 from braidcast.vessels.holes import holes_and_openings, opening
 from braidcast.vessels.lids import without_lids
@@ -24,17 +25,20 @@ def repaired(vertices: Array, triangles: IntArray, *, open_lids: bool = True) ->
 
     ``InputError``, its text to follow the surface's name, for what cannot be mended: coordinates
     that are no numbers, no area, several pieces, edges of three triangles, one side only, large
-    holes, open edges that are no ends, a wall that passes through itself.
+    holes, open edges that are no ends, a wall that passes through itself, a loose piece that passes
+    through the wall or is a body in the lumen.
     """
     vertices, triangles, remarks = welded(
         np.asarray(vertices, dtype=np.float64), np.asarray(triangles, dtype=np.int64)
     )
-    triangles, left_out = largest_piece(vertices, triangles)
+    triangles, loose, left_out = largest_piece(vertices, triangles)
+    crumbs = vertices[loose]
     triangles, turned = oriented(vertices, triangles)
     triangles, thinned = without_slivers(vertices, _canonical(triangles))
     triangles, opened = without_lids(vertices, triangles) if open_lids else (triangles, [])
     if opened:
-        triangles, _ = largest_piece(vertices, triangles)  # what may have been inside a lid is gone
+        # What may have been inside a lid is gone.
+        triangles = largest_piece(vertices, triangles)[0]
     vertices, triangles, rims, filled = holes_and_openings(vertices, triangles)
     creased = refuse_self_intersection(vertices, triangles)
 
@@ -45,12 +49,14 @@ def repaired(vertices: Array, triangles: IntArray, *, open_lids: bool = True) ->
     openings.sort(key=lambda end: (-round(end.radius, 3), *end.centre.round(3).tolist()))
     if not openings and open_lids:
         filled.append("the surface is closed: it has no opening and no flat end to open")
-    return LumenSurface(
+    surface = LumenSurface(
         vertices=vertices,
         triangles=_canonical(corners.reshape(-1, 3)),
         openings=tuple(openings),
         remarks=(*remarks, *left_out, *turned, *thinned, *opened, *filled, *creased),
     )
+    refuse_serious(crumbs, surface)
+    return surface
 
 
 def _canonical(triangles: IntArray) -> IntArray:

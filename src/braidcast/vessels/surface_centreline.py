@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from braidcast.errors import InputError
 from braidcast.vessels.centreline_file import flipped_lps_ras, read_centreline
-from braidcast.vessels.centreline_search import find_centreline
+from braidcast.vessels.centreline_search import centred, find_centreline
 from braidcast.vessels.lumen_surface import LumenSurface, Opening
 from braidcast.vessels.mesh_distance import MeshDistance
 from braidcast.vessels.polyline import Polyline
@@ -20,8 +20,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_RADII_TO_DEPTHS = 3.0
-"""The largest given radius and the distances to the wall differ by this factor at most."""
+_USUAL_RATIOS, _ALLOWED_RATIOS = (0.7, 1.5), (0.5, 2.0)
+"""Given radii over the distance to the wall: the median of all places, and nine of ten of them."""
+_BEYOND = 0.25
+"""What a given line may reach beyond an open end before that is cut, mm."""
+_STEP = 0.1
+"""Between the places along a line that are looked at, mm."""
+_OFF = 0.1
+"""From here on it is said how far a line lies off the middle of the lumen, mm."""
 
 
 def centreline_of(
@@ -42,6 +48,7 @@ def centreline_of(
     given = read_centreline(source.centreline, ends)
     with about(f"{where}:"):
         line = Polyline.through(given.points, given.radii)
+    line, cut = _within_ends(line, surface)
     inside = _share_inside(line, wall)
     if inside < 0.9:
         turned = Polyline.through(flipped_lps_ras(given.points))
@@ -54,21 +61,66 @@ def centreline_of(
             f"{where} lies within the surface for {100.0 * inside:.0f} % of its length, must for "
             f"90 % at least{guess}"
         )
-    if given.radii is None:
-        return _with_depths(line, wall), list(given.remarks)
-    _check_radii(given.radii, _depths(line, wall), where)
-    return line, list(given.remarks)
+    remarks = [*given.remarks, *cut]
+    if given.radii is not None:
+        _check_radii(line, wall, where)
+        return line, remarks
+    line, moved = _centred(line, wall)
+    return line, remarks + moved
 
 
-def _check_radii(radii: Array, depths: Array, where: str) -> None:
-    """``InputError`` for given radii that are not those of this lumen: diameters in cm, say."""
-    most, least = _RADII_TO_DEPTHS * depths.max(), depths.min() / _RADII_TO_DEPTHS
-    if radii.max() > most or radii.max() < least:
-        raise InputError(
-            f"{where} has a largest radius of {radii.max():.3g} mm, must be from "
-            f"{max(least, 0.0):.2g} to {most:.2g} mm: the wall is {max(depths.min(), 0.0):.2g} to "
-            f"{depths.max():.2g} mm away"
-        )
+def _within_ends(line: Polyline, surface: LumenSurface) -> tuple[Polyline, list[str]]:
+    """The line without what lies beyond open ends, and a remark if that was cut."""
+    along = np.linspace(0.0, line.length, max(8, int(line.length / _STEP)))
+    places = line.at_arc_length(along)
+    _, overrun = MeshDistance(surface).distance_and_overrun(places)
+    within = np.flatnonzero(overrun == 0.0)
+    if len(within) == 0:
+        return line, []
+    first, last = within[0], within[-1]
+    beyond = along[first] + line.length - along[last]
+    if beyond <= _BEYOND or last - first < 8:
+        return line, []
+    kept = slice(first, last + 1)
+    radii = line.lumen_radius(along[kept]) if line.radius_curve is not None else None
+    remark = f"the centreline goes {beyond:.2f} mm beyond the open ends and was cut there"
+    return Polyline.through(places[kept], radii), [remark]
+
+
+def _centred(line: Polyline, wall: MeshDistance) -> tuple[Polyline, list[str]]:
+    """A line without radii moved to the middle of the lumen, with its radii, and remarks."""
+    try:
+        middle = centred(wall.distance, line)
+    except InputError as error:
+        return _with_depths(line, wall), [
+            f"the centreline was left as it is, its radii being the distances to the wall: {error}"
+        ]
+    away = float(middle.closest(line.at_arc_length(np.linspace(0.0, line.length, 200)))[0].max())
+    if away < _OFF:
+        return middle, []
+    return middle, [
+        f"the centreline lies up to {away:.2f} mm off the middle of the lumen and was moved there"
+    ]
+
+
+def _check_radii(line: Polyline, wall: MeshDistance, where: str) -> None:
+    """``InputError`` for given radii that are not those of this lumen: diameters, say."""
+    along = np.linspace(0.0, line.length, 200)
+    depths, radii = _depths(line, wall), line.lumen_radius(along)
+    ratios = radii / np.maximum(depths, 1e-3)
+    usual, share = float(np.median(ratios)), float(np.mean(_between(ratios, _ALLOWED_RATIOS)))
+    if _between(usual, _USUAL_RATIOS) and share >= 0.9:
+        return
+    raise InputError(
+        f"{where} has radii of {radii.min():.3g} to {radii.max():.3g} mm, must be those of the "
+        f"lumen: the wall is {max(depths.min(), 0.0):.2g} to {depths.max():.2g} mm away, and they "
+        f"are {usual:.2g} times that in the median, where {_USUAL_RATIOS[0]} to "
+        f"{_USUAL_RATIOS[1]} are allowed"
+    )
+
+
+def _between(values: Any, limits: tuple[float, float]) -> Any:
+    return (limits[0] <= values) & (values <= limits[1])
 
 
 def _end_radii(surface: LumenSurface, ends: Array) -> Array | None:

@@ -127,7 +127,7 @@ def load_vessel(source: SurfaceSource, progress: Progress | None = None) -> Surf
     return _loaded[key]
 
 
-VERSION = 1
+VERSION = 2
 """Raised whenever the same files would give another vessel."""
 
 _MOST_LOADED = 2

@@ -129,7 +129,7 @@ function along({ site }, g, device) {
       + `mm when crimped, must be at most ${general(length - MARGIN, 4)} mm: the vessel's centreline `
       + `is ${general(length, 4)} mm long and ${MARGIN} mm stay free`;
   }
-  if (0 <= begin && begin <= spare) return null;
+  if (0 <= begin && begin <= spare) return site.point == null ? null : beside(site.point, g);
   const middle = 0.5 * crimped;
   let [name, value, low, high] = ["point", "", middle, spare + middle];
   if (site.proximal_end_mm != null) {
@@ -143,6 +143,18 @@ function along({ site }, g, device) {
   return `site.${name} = ${value} must be from ${general(low, 4)} to ${general(high, 4)} mm along the `
     + `centreline of ${general(length, 4)} mm, or the crimped stent of ${general(crimped, 4)} mm `
     + "reaches beyond its ends";
+}
+
+/** A site's point lies within so many lumen radii of the centreline, or about the sac. */
+const MOST_RADII = 3;
+
+function beside(point, g) {
+  const away = closestPlace(g.curve, point).distance;
+  const sac = g.sacCentre ? closestPlace(g.curve, g.sacCentre).distance + g.sacRadius : 0;
+  const most = Math.max(MOST_RADII * g.vesselRadius, sac);
+  if (away <= most) return null;
+  return `site.point = ${floats(point)} is ${general(away, 4)} mm from the vessel's centreline, must be `
+    + `at most ${general(most, 4)} mm from it`;
 }
 
 function saccular({ vessel, aneurysm }, g) {
