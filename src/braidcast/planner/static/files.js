@@ -24,9 +24,9 @@ function possible(planner) {
   return planner;
 }
 
-/** [{view, caption}] */
+/** [{view, caption}] from left to right: A, if it is there, before B. */
 function shownPictures({ pictures, captions }) {
-  return captions.map((caption, i) => ({ view: pictures[i].view, caption }));
+  return captions.map((caption, i) => ({ view: pictures[i].view, caption })).reverse();
 }
 
 function caseFile({ start }, tables) {
@@ -54,7 +54,7 @@ async function page(planner) {
   const { start, state, seen, model, strip, pictures } = planner;
   const images = [];
   pictures.forEach((each) => each.view.setDark(false)); // for paper
-  images.push({ caption: planner.captions.filter(Boolean).join(" | ") || "As seen", url: await dataUrl(await sheet(shownPictures(planner), planner.scale)) });
+  images.push({ caption: shownPictures(planner).map(({ caption }) => caption).filter(Boolean).join(" | ") || "As seen", url: await dataUrl(await sheet(shownPictures(planner), planner.scale)) });
   const { view } = pictures[0];
   const { pose } = view;
   for (const name of state.compare === "sides" ? [] : ["front", "top"]) {
