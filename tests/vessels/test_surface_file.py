@@ -12,7 +12,7 @@ import braidcast.vessels.vtk_file as vtk_file
 from braidcast.errors import InputError
 from braidcast.vessels import QuadraticBezier, SaccularVessel, Tube, vessel_surface, write_stl
 from braidcast.vessels.repair import repaired
-from braidcast.vessels.surface_file import read_surface
+from braidcast.vessels.surface_file import declared_axes, read_surface
 from braidcast.vessels.vtk_file import read_vtk_lines, read_vtk_polygons
 
 
@@ -218,7 +218,102 @@ def test_corner_that_is_not_there(tmp_path):
 
 def test_one_triangle_is_no_vessel(tmp_path):
     path = written(tmp_path / "a.stl", np.diag([9.0, 9, 9]), np.array([[0, 1, 2]]))
-    refused(path, "is no wall around a lumen: no volume is enclosed by its 1 triangle")
+    refused(path, "holds 1 triangle, which is no vessel: must be 4 or more")
+    path = written(tmp_path / "a.stl", np.diag([0.1, 0.1, 0.1]), np.array([[0, 1, 2]]))
+    refused(path, "holds 1 triangle, which is no vessel")
+
+
+def test_crumb_far_away_does_not_count_as_the_vessel_s_size(tmp_path, tube):
+    vertices, triangles = tube(rings=9)
+    crumb = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]) + [900.0, 0.0, 0.0]
+    sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]) + len(vertices)
+    both = np.concatenate([vertices, crumb]), np.concatenate([triangles, sides])
+    surface = read_surface(written(tmp_path / "a.stl", *both))
+    assert np.ptp(surface.vertices, axis=0).max() == pytest.approx(20.0)
+    assert "1 loose piece of 4 triangles was left out" in surface.remarks[0]
+    both = both[0] * 1e-3, both[1]
+    refused(written(tmp_path / "b.stl", *both), 'by 0.02 mm with units = "mm"')
+
+
+def test_vessel_too_large_for_a_grid_is_guessed_to_have_other_units(tmp_path, tube):
+    vertices, triangles = tube(2.0, 40.0, rings=9)
+    turn = np.linalg.qr(np.array([[1.0, 2, 3], [-1, 1, 0], [1, 1, -1]]))[0]
+    path = written(tmp_path / "a.obj", vertices @ turn, triangles)
+    said = 'units = "mm" would make it 3'
+    assert "too large for a grid" in refused(path, said, units="cm")
+    read_surface(path)
+
+
+def obj(path, vertices, faces, between=""):
+    """Vertices and faces of words, with ``between`` before the faces."""
+    lines = ["v {!r} {!r} {!r}".format(*row) for row in vertices.tolist()]
+    lines += [between] + ["f " + " ".join(face) for face in faces]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_obj_with_all_that_a_surface_does_not_need(tmp_path, tube):
+    vertices, triangles = tube(rings=9)
+    plain = [[str(corner) for corner in row] for row in (triangles + 1).tolist()]
+    expected = read_surface(obj(tmp_path / "plain.obj", vertices, plain))
+    text = (tmp_path / "plain.obj").read_text()
+    normals = "vn 0 0 1\nvt 0.5 0.5\nusemtl a"
+    textured = [[f"{corner}/1/1" for corner in face] for face in plain]
+    half = len(textured) // 2
+    textured[half][-1] += "\nusemtl b\no other\ng part\ns off\nl 1 2 3"
+    relative = (triangles - len(vertices)).tolist()
+    others = {
+        "materials": obj(tmp_path / "a.obj", vertices, textured, normals).read_text(),
+        "normals": text.replace("f ", "vn 0 0 1\nf ", 1).replace("\nf 1 ", "\nf 1//1 "),
+        "tabs": text.replace(" ", "\t"),
+        "indents": text.replace("f ", "  f  ").replace("v ", " v "),
+        "continued": text.replace("f ", "f \\\n"),
+        "carriage returns": text.replace("\n", "\r\n"),
+        "comments": "# v 1 2 3\n" + text.replace("\nf ", " # f 1 2\nf "),
+        "colours": text.replace("\nv", " 1 0 0\nv"),
+        "relative": obj(
+            tmp_path / "b.obj", vertices, [[f"{i}/-1" for i in row] for row in relative], "vt 0 0"
+        ).read_text()
+        + "v 500 500 500\n" * 7,
+    }
+    for name, other in others.items():
+        (tmp_path / "other.obj").write_text(other)
+        surface = read_surface(tmp_path / "other.obj")
+        assert_array_equal(surface.vertices, expected.vertices, err_msg=name)
+        assert_array_equal(surface.triangles, expected.triangles, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("f 0 1 2", "line 5 has the vertex 0, must be from 1 up, or from -1 down to -4"),
+        ("f 1 2 -5", "line 5 has the vertex -5, must be"),
+        ("f 1 2 5", "line 5 has the vertex 5, where there are 4"),
+        ("f 1 2", "line 5 must hold a face of three or more vertices' numbers, not 'f 1 2'"),
+        ("f 1 2 x", "line 5 must hold a face"),
+        ("f 1 2 /3", "line 5 must hold a face"),
+        ("v 1,5 2,5 3,5", "line 5 must hold a vertex of three numbers, not 'v 1,5 2,5 3,5'"),
+        ("v 1 2", "line 5 must hold a vertex"),
+    ],
+)
+def test_obj_line_that_is_wrong_is_named(tmp_path, line, said):
+    corners = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\n"
+    (tmp_path / "a.obj").write_text(f"{corners}{line}\nf 1 2 3\n")
+    refused(tmp_path / "a.obj", f"is damaged: {said}")
+
+
+@pytest.mark.parametrize(
+    ("beginning", "axes"),
+    [
+        (b"3D Slicer output. SPACE=LPS".ljust(80) + bytes(4), "LPS"),
+        (b"solid 3D Slicer output. SPACE=RAS\nfacet", "RAS"),
+        (b"solid SPACE=LPSX\n", None),
+        (b"", None),
+    ],
+)
+def test_axes_that_a_file_declares(tmp_path, beginning, axes):
+    (tmp_path / "a.stl").write_bytes(beginning)
+    assert declared_axes(tmp_path / "a.stl") == axes
 
 
 def test_no_number_is_refused_with_its_place(tmp_path, tube):

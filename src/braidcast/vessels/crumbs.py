@@ -13,7 +13,7 @@ from braidcast.vessels.wording import place
 
 _TOUCHING = 0.05
 """Corners as far as this on the other side of the wall do not count, mm."""
-_BODY = 0.5
+_BODY = 0.75
 """A body in the lumen counts from this share of the lumen's radius in size on."""
 
 

@@ -45,7 +45,7 @@ def centreline_of(
             ends = _two_openings(source, surface)
         bounds = np.array([surface.vertices.min(axis=0), surface.vertices.max(axis=0)])
         return find_centreline(wall.distance, bounds, ends, _end_radii(surface, ends)), []
-    given = read_centreline(source.centreline, ends)
+    given = read_centreline(source.centreline, ends, source.surface)
     with about(f"{where}:"):
         line = Polyline.through(given.points, given.radii)
     line, cut = _within_ends(line, surface)

@@ -4,23 +4,39 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import warnings
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from braidcast.errors import InputError
-from braidcast.vessels.edges import Array, IntArray
+from braidcast.vessels.edges import Array, IntArray, area_vectors
+from braidcast.vessels.grid_spacing import COARSEST, grown_size, least_spacing
 from braidcast.vessels.input_file import checked_ending
 from braidcast.vessels.lumen_surface import LumenSurface
+from braidcast.vessels.obj_file import read_obj
 from braidcast.vessels.orientation import lumen_radius
 from braidcast.vessels.repair import repaired
-from braidcast.vessels.units import check_extent, check_lumen, millimetres
+from braidcast.vessels.units import (
+    MILLIMETRES,
+    check_extent,
+    check_lumen,
+    likelier_units,
+    millimetres,
+)
 from braidcast.vessels.vtk_file import ENDINGS as VTK_ENDINGS
 from braidcast.vessels.vtk_file import read_vtk_polygons
-from braidcast.vessels.wording import counted, was
+from braidcast.vessels.wording import about, counted, was
 
 ENDINGS = (".stl", ".ply", ".obj", *VTK_ENDINGS)
+
+_FEWEST = 4
+"""Triangles that can enclose a volume."""
+_BEGINNING = 512
+"""Bytes in which the header of an STL or the first comments of another file lie."""
 
 
 def read_surface(
@@ -38,19 +54,18 @@ def read_surface(
     ending = checked_ending(path, "surface", ENDINGS)
     if ending in VTK_ENDINGS:
         vertices, triangles, polygons = read_vtk_polygons(path)
+    elif ending == ".obj":
+        vertices, triangles, polygons = _read_obj(Path(path), where)
     else:
         vertices, triangles, polygons = _read_by_trimesh(Path(path), ending, where)
-    try:
+    with about(where):
         _check_corners(vertices, triangles)
-        used = factor * vertices[np.unique(triangles)]
-        if np.all(np.isfinite(used)) and not closed:  # what is not is refused below, with its place
-            check_extent(np.ptp(used, axis=0), units)
-        surface = repaired(factor * vertices, triangles, open_lids=not closed)
+        vertices = factor * vertices
         if not closed:
-            extent = float(np.max(np.ptp(surface.vertices, axis=0)))
-            check_lumen(lumen_radius(surface.vertices, surface.triangles), extent, units)
-    except InputError as error:
-        raise InputError(f"{where} {error}") from None
+            _check_extent_before_repair(vertices, triangles, units)
+        surface = repaired(vertices, triangles, open_lids=not closed)
+        if not closed:
+            _check_vessel(surface, units)
     if polygons == len(triangles):
         return surface
     remark = (
@@ -60,6 +75,63 @@ def read_surface(
     return LumenSurface(
         surface.vertices, surface.triangles, surface.openings, (remark, *surface.remarks)
     )
+
+
+def _check_extent_before_repair(vertices: Array, triangles: IntArray, units: str) -> None:
+    """As ``check_extent``, of the vertices (n, 3) mm; a crumb far away does not count."""
+    used = vertices[np.unique(triangles)]
+    if not np.all(np.isfinite(used)):
+        return  # refused by the repair, with its place
+    try:
+        check_extent(np.ptp(used, axis=0), units)
+    except InputError:
+        main = _main_part(vertices, triangles)
+        check_extent(np.ptp(vertices[np.unique(main)], axis=0), units)
+
+
+def _main_part(vertices: Array, triangles: IntArray) -> IntArray:
+    """The triangles that hang together and have most of the area; all, if none have most of it."""
+    _, same = np.unique(vertices, axis=0, return_inverse=True)
+    corners = same.reshape(-1)[triangles]
+    starts, ends = corners[:, [0, 1]].ravel(), corners[:, [1, 2]].ravel()
+    graph = coo_array((np.ones(len(starts)), (starts, ends)), shape=(len(vertices),) * 2)
+    _, part = connected_components(graph, directed=False)
+    of_triangle = part[corners[:, 0]]
+    area = np.bincount(of_triangle, np.linalg.norm(area_vectors(vertices, triangles), axis=1))
+    largest = int(np.argmax(area))
+    return triangles[of_triangle == largest] if area[largest] > 0.5 * area.sum() else triangles
+
+
+def _check_vessel(surface: LumenSurface, units: str) -> None:
+    """Refuse a size that no vessel has, or one too large for a grid that other units make fit."""
+    size = np.ptp(surface.vertices, axis=0)
+    check_extent(size, units)
+    extent, radius = float(size.max()), lumen_radius(surface.vertices, surface.triangles)
+    check_lumen(radius, extent, units)
+    if least_spacing(grown_size(surface)) <= COARSEST:
+        return
+    if likelier := likelier_units(extent, radius, units):
+        scale = MILLIMETRES[likelier] / MILLIMETRES[units]
+        raise InputError(
+            f'is {extent:.3g} mm long with a lumen of radius {radius:.2g} mm with units = "{units}"'
+            f', too large for a grid: units = "{likelier}" would make it {scale * extent:.3g} mm '
+            f"long with {scale * radius:.2g} mm; or cut it to the part of the vessel that is needed"
+        )
+
+
+def declared_axes(path: str | os.PathLike[str]) -> str | None:
+    """ "LPS" or "RAS" if a file's beginning says so, as 3D Slicer writes it; None if not."""
+    with Path(path).open("rb") as stream:
+        found = re.search(rb"SPACE=(LPS|RAS)\b", stream.read(_BEGINNING))
+    return found[1].decode() if found else None
+
+
+def _read_obj(path: Path, where: str) -> tuple[Array, IntArray, int]:
+    try:
+        with about(where):
+            return read_obj(path)
+    except OSError as error:
+        raise InputError(f"{where} cannot be read: {error.strerror or error}") from None
 
 
 def _read_by_trimesh(path: Path, ending: str, where: str) -> tuple[Array, IntArray, int]:
@@ -101,8 +173,6 @@ def _read_by_trimesh(path: Path, ending: str, where: str) -> tuple[Array, IntArr
 
 def _polygons(path: Path, ending: str) -> int | None:
     """How many polygons a file that may hold other than triangles says it has."""
-    if ending == ".obj":
-        return sum(line.lstrip().startswith(b"f ") for line in path.read_bytes().splitlines())
     if ending == ".ply":
         for line in path.read_bytes().split(b"end_header", 1)[0].splitlines():
             if line.startswith(b"element face"):
@@ -112,9 +182,14 @@ def _polygons(path: Path, ending: str) -> int | None:
 
 def _check_corners(vertices: Array, triangles: IntArray) -> None:
     if len(triangles) == 0:
-        raise InputError("holds no triangle")
+        raise InputError("is damaged or holds no triangle")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise InputError(
             f"is damaged: a triangle has the vertex {triangles.max()}, "
             f"where there are {len(vertices)}"
+        )
+    if (number := len(triangles)) < _FEWEST:
+        one = "is" if number == 1 else "are"
+        raise InputError(
+            f"holds {counted(number, 'triangle')}, which {one} no vessel: must be {_FEWEST} or more"
         )

@@ -1,8 +1,10 @@
-"""Units of length of a surface's file, and whether its size is one that a vessel has."""
+"""Units of length of a file, and whether its size is one that a vessel or a centreline has."""
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from braidcast.errors import InputError
 from braidcast.vessels.edges import Array
@@ -33,10 +35,9 @@ def check_extent(size: Array, units: str) -> None:
     """
     extent = float(max(size))
     if not SHORTEST <= extent <= LONGEST:
-        said = " by ".join(f"{value:.3g}" for value in size)
         raise InputError(
-            f'is {said} mm with units = "{units}", where the largest must be from {SHORTEST:g} to '
-            f"{LONGEST:g} mm, {_guess(extent / MILLIMETRES[units])}"
+            f'is {_by(size)} mm with units = "{units}", where the largest must be from '
+            f"{SHORTEST:g} to {LONGEST:g} mm, {_guess(extent / MILLIMETRES[units])}"
         )
 
 
@@ -51,21 +52,59 @@ def check_lumen(radius: float, extent: float, units: str) -> None:
         )
 
 
-def _guess(extent: float, radius: float | None = None) -> str:
-    """What units the numbers of a file may be, by the largest extent and the lumen's radius."""
-    guesses = [
+def check_centreline_extent(points: Array) -> None:
+    """Refuse a centreline's points (n, 3), taken as mm, that are of another unit by their extent.
+
+    ``InputError``, its text to follow the file's name, names that unit.
+    """
+    size = np.ptp(points, axis=0)
+    extent = float(max(size))
+    if not SHORTEST <= extent <= LONGEST:
+        guesses = _fitting(extent)
+        likely = f", which smells of {_NAMES[guesses[0]]}" if guesses else ""
+        raise InputError(
+            f"is {_by(size)} mm, where the largest must be from {SHORTEST:g} to {LONGEST:g} mm"
+            f"{likely}: a centreline is given in mm, unless a .json says other coordinateUnits"
+        )
+
+
+def likelier_units(extent: float, radius: float, units: str) -> str | None:
+    """Units other than ``units`` that make a vessel of so many mm an ordinary one, if any do."""
+    factor = MILLIMETRES[units]
+    return next(
+        (
+            unit
+            for unit in _fitting(extent / factor, radius / factor)
+            if unit != units and _unusual(extent / factor * MILLIMETRES[unit]) == 0.0
+        ),
+        None,
+    )
+
+
+def _fitting(extent: float, radius: float | None = None) -> list[str]:
+    """The units that make a vessel of a file's numbers, the likeliest first."""
+    fitting = [
         unit
         for unit, mm in MILLIMETRES.items()
         if SHORTEST <= extent * mm <= LONGEST
         and (radius is None or THINNEST <= radius * mm <= WIDEST)
     ]
-    guesses.sort(key=lambda unit: _unusual(extent * MILLIMETRES[unit]))
+    return sorted(fitting, key=lambda unit: _unusual(extent * MILLIMETRES[unit]))
+
+
+def _guess(extent: float, radius: float | None = None) -> str:
+    """What units the numbers of a file may be, by the largest extent and the lumen's radius."""
+    guesses = _fitting(extent, radius)
     if guesses:
         said = " or ".join(f'"{unit}"' for unit in guesses)
         return f"which smells of {_NAMES[guesses[0]]}: say units = {said}"
     if SHORTEST <= extent * 1e-3 <= LONGEST:
         return "which smells of micrometres: scale it to mm"
     return "which no unit makes a vessel's"
+
+
+def _by(size: Array) -> str:
+    return " by ".join(f"{value:.3g}" for value in size)
 
 
 _NAMES = {"mm": "millimetres", "cm": "centimetres", "m": "metres", "inch": "inches"}
