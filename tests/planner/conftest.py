@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import pytest
 from driving import opened
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 from starlette.applications import Starlette
 
 from braidcast.planner.contents import Contents
@@ -22,6 +22,10 @@ _DRAWN_BY_THE_PROCESSOR = (
     *("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
     *("--no-sandbox", "--disable-dev-shm-usage"),
 )
+
+
+# What is expected comes at once, but not on a machine that has other work.
+expect.set_options(timeout=30_000.0)
 
 
 @dataclass(frozen=True)

@@ -305,11 +305,11 @@ def test_a_restarted_server_is_noticed(
         settled(browser_page)
         browser_page.wait_for_timeout(500)
     banner = browser_page.locator("[data-banner=server]")
-    expect(banner).to_contain_text("The server is gone", timeout=10_000)
+    expect(banner).to_contain_text("The server is gone")
     slide(browser_page, "site_eta", 0.4)
     expect(browser_page.locator("#verdict")).to_contain_text("Success")
     with serving(application(contents), served.port):
-        expect(banner).to_contain_text("was restarted", timeout=10_000)
+        expect(banner).to_contain_text("was restarted")
         assert tables(browser_page)["site"]["eta"] == 0.4
         browser_page.goto("about:blank")
     assert troubles and all("ERR_CONNECTION" in trouble for trouble in troubles)
