@@ -159,7 +159,8 @@ class Planner {
     this.compare.show(this.state.compare, a?.all ?? [], this.#rowsOf(seen), this.impossible);
     this.#showStrip(now);
     this.seen = seen;
-    document.body.dataset.ready = this.stdReady ? "all" : "page"; // with standard deviations, or not yet
+    const ready = this.stdReady ? "all" : "page"; // with standard deviations, or not yet
+    if (document.body.dataset.ready !== ready) document.body.dataset.ready = ready;
   }
 
   #warn(name, outside, look) {
