@@ -21,21 +21,30 @@ from braidcast.vessels.wording import counted, place, was
 CRUMB = 0.2
 
 
+def pieces_of(vertices: Array, triangles: IntArray) -> tuple[IntArray, Array]:
+    """The piece (m,) that each triangle belongs to, and the area of each piece, mm².
+
+    Triangles hang together at edges.
+    """
+    edges = edges_of(triangles)
+    # Each triangle is linked with the edges it has.
+    m, e = len(triangles), len(edges.ends)
+    links = (np.ones(3 * m), (np.arange(3 * m) // 3, m + edges.of_side))
+    pieces, label = connected_components(coo_array(links, shape=(m + e, m + e)), directed=False)
+    size = np.linalg.norm(area_vectors(vertices, triangles), axis=1)
+    of_triangle = label[:m].astype(np.int64)
+    return of_triangle, np.bincount(of_triangle, size, pieces).astype(np.float64)
+
+
 def largest_piece(vertices: Array, triangles: IntArray) -> tuple[IntArray, IntArray, list[str]]:
     """The triangles of the piece with the largest area, those left out, and a remark on them.
 
     ``InputError`` if another has more than a fifth of its area.
     """
-    edges = edges_of(triangles)
-    # Triangles hang together at edges: each is linked with the edges it has.
-    m, e = len(triangles), len(edges.ends)
-    links = (np.ones(3 * m), (np.arange(3 * m) // 3, m + edges.of_side))
-    pieces, label = connected_components(coo_array(links, shape=(m + e, m + e)), directed=False)
-    label = label[:m]
+    label, area = pieces_of(vertices, triangles)
+    pieces = len(area)
     if pieces == 1:
         return triangles, triangles[:0], []
-    size = np.linalg.norm(area_vectors(vertices, triangles), axis=1)
-    area = np.bincount(label, size, pieces)
     order = np.argsort(-area, kind="stable")
     second = triangles[label == order[1]]
     where = place(vertices[second].mean(axis=(0, 1)))

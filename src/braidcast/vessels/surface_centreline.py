@@ -95,7 +95,7 @@ def _centred(line: Polyline, wall: MeshDistance) -> tuple[Polyline, list[str]]:
         return _with_depths(line, wall), [
             f"the centreline was left as it is, its radii being the distances to the wall: {error}"
         ]
-    away = float(middle.closest(line.at_arc_length(np.linspace(0.0, line.length, 200)))[0].max())
+    away = float(middle.closest(line.at_arc_length(_everywhere(line)))[0].max())
     if away < _OFF:
         return middle, []
     return middle, [
@@ -105,8 +105,7 @@ def _centred(line: Polyline, wall: MeshDistance) -> tuple[Polyline, list[str]]:
 
 def _check_radii(line: Polyline, wall: MeshDistance, where: str) -> None:
     """``InputError`` for given radii that are not those of this lumen: diameters, say."""
-    along = np.linspace(0.0, line.length, 200)
-    depths, radii = _depths(line, wall), line.lumen_radius(along)
+    depths, radii = _depths(line, wall), line.lumen_radius(_everywhere(line))
     ratios = radii / np.maximum(depths, 1e-3)
     usual, share = float(np.median(ratios)), float(np.mean(_between(ratios, _ALLOWED_RATIOS)))
     if _between(usual, _USUAL_RATIOS) and share >= 0.9:
@@ -138,7 +137,12 @@ def _share_inside(line: Polyline, wall: MeshDistance) -> float:
 
 def _depths(line: Polyline, wall: MeshDistance) -> Array:
     """Distance to the wall, (200,) mm, from places evenly along a line; negative outside."""
-    return -wall.distance(line.at_arc_length(np.linspace(0.0, line.length, 200)))
+    return -wall.distance(line.at_arc_length(_everywhere(line)))
+
+
+def _everywhere(line: Polyline) -> Array:
+    """Arc lengths (200,) mm evenly along a line."""
+    return np.linspace(0.0, line.length, 200)
 
 
 def _with_depths(line: Polyline, wall: MeshDistance) -> Polyline:

@@ -9,16 +9,14 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from braidcast.errors import InputError
-from braidcast.vessels.edges import Array, IntArray, area_vectors
+from braidcast.vessels.edges import Array, IntArray
 from braidcast.vessels.grid_spacing import COARSEST, grown_size, least_spacing
 from braidcast.vessels.input_file import checked_ending
 from braidcast.vessels.lumen_surface import LumenSurface
 from braidcast.vessels.obj_file import read_obj
-from braidcast.vessels.orientation import lumen_radius
+from braidcast.vessels.orientation import lumen_radius, pieces_of
 from braidcast.vessels.repair import repaired
 from braidcast.vessels.units import (
     MILLIMETRES,
@@ -91,15 +89,10 @@ def _check_extent_before_repair(vertices: Array, triangles: IntArray, units: str
 
 def _main_part(vertices: Array, triangles: IntArray) -> IntArray:
     """The triangles that hang together and have most of the area; all, if none have most of it."""
-    _, same = np.unique(vertices, axis=0, return_inverse=True)
-    corners = same.reshape(-1)[triangles]
-    starts, ends = corners[:, [0, 1]].ravel(), corners[:, [1, 2]].ravel()
-    graph = coo_array((np.ones(len(starts)), (starts, ends)), shape=(len(vertices),) * 2)
-    _, part = connected_components(graph, directed=False)
-    of_triangle = part[corners[:, 0]]
-    area = np.bincount(of_triangle, np.linalg.norm(area_vectors(vertices, triangles), axis=1))
+    joined, same = np.unique(vertices, axis=0, return_inverse=True)
+    part, area = pieces_of(joined, same.reshape(-1)[triangles])
     largest = int(np.argmax(area))
-    return triangles[of_triangle == largest] if area[largest] > 0.5 * area.sum() else triangles
+    return triangles[part == largest] if area[largest] > 0.5 * area.sum() else triangles
 
 
 def _check_vessel(surface: LumenSurface, units: str) -> None:

@@ -152,10 +152,10 @@ class Planner {
     const seen = now.impossible ? this.seen : now;
     if (seen) this.siteControl.show(tables.site.eta, seen.geometry);
     find("panel").classList.toggle("stale-readouts", Boolean(now.impossible));
-    this.#showPictures(now, seen);
+    this.#showPictures(now, seen, a);
     this.#showVerdict(now);
     if (!now.impossible) showRows(find("readouts"), now.rows);
-    this.simulation.show(tables, now.impossible ?? "", now.simulated ?? []);
+    this.simulation.show(tables, this.impossible, now.simulated ?? []);
     this.compare.show(this.state.compare, a?.all ?? [], this.#rowsOf(seen), this.impossible);
     this.#showStrip(now);
     this.seen = seen;
@@ -194,10 +194,9 @@ class Planner {
     return { a: this.#lookA()?.all ?? null, b: this.#rowsOf(this.seen) };
   }
 
-  #showPictures(now, seen) {
+  #showPictures(now, seen, a) {
     const { compare, colour } = this.state;
     const sides = compare === "sides";
-    const a = this.#lookA();
     this.#arrange(sides);
     const coloured = [seen, sides ? a : null].filter((look) => look?.braid);
     this.scale = coloured.length ? scaleOf(colour, coloured) : null;

@@ -54,7 +54,8 @@ async function page(planner) {
   const { start, state, seen, model, strip, pictures } = planner;
   const images = [];
   pictures.forEach((each) => each.view.setDark(false)); // for paper
-  images.push({ caption: shownPictures(planner).map(({ caption }) => caption).filter(Boolean).join(" | ") || "As seen", url: await dataUrl(await sheet(shownPictures(planner), planner.scale)) });
+  const shown = shownPictures(planner);
+  images.push({ caption: shown.map(({ caption }) => caption).filter(Boolean).join(" | ") || "As seen", url: await dataUrl(await sheet(shown, planner.scale)) });
   const { view } = pictures[0];
   const { pose } = view;
   for (const name of state.compare === "sides" ? [] : ["front", "top"]) {
@@ -64,7 +65,7 @@ async function page(planner) {
   view.pose = pose;
   pictures.forEach((each) => each.view.setDark(planner.isDark));
   const { a, b } = planner.bothRows;
-  const rows = a ? paired(a, b).map(([, ...texts]) => texts) : b.map(([, ...texts]) => texts);
+  const rows = (a ? paired(a, b) : b).map(([, ...texts]) => texts);
   const remarks = [...document.querySelectorAll(".banner.error, .banner.warning")].map((banner) => banner.textContent);
   if (model) remarks.push(`Success is called from a probability of ${(100 * model.threshold).toFixed(0)} % on.`);
   if (start.withoutModel) remarks.push(start.withoutModel);

@@ -1,6 +1,7 @@
 /** Pictures side by side, their captions and the scale of their colours, as one PNG. */
 
 import { ticksOf } from "./legend.js";
+import { pngOf } from "./view.js";
 import { palette } from "./wires.js";
 
 const MARGIN = 10, BAR = 200, FOOT = 70; // CSS pixels
@@ -28,9 +29,7 @@ export async function sheet(pictures, scale) {
     left += width;
   });
   if (scale) drawScale(context, scale, top, colours.text);
-  return new Promise((resolve, reject) => {
-    canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("the browser made no picture"))), "image/png");
-  });
+  return pngOf(canvas);
 }
 
 function drawScale(context, scale, top, text) {

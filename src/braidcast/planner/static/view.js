@@ -272,9 +272,7 @@ export class View {
     this.draw(); // the browser keeps it only until this task ends
     context.drawImage(this.canvas, 0, 0);
     context.drawImage(this.overlay, 0, 0, picture.width, picture.height);
-    return new Promise((resolve, reject) => {
-      picture.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("the browser made no picture"))), "image/png");
-    });
+    return pngOf(picture);
   }
 
   /** Gives everything back, the canvas's WebGL context too: the canvas cannot be used again. */
@@ -358,6 +356,13 @@ export class View {
     }
     this[name].forEach((line, i) => line.setPositions(lines[i].flat()));
   }
+}
+
+/** What is on a canvas as a PNG file, a promise of a Blob. */
+export function pngOf(canvas) {
+  return new Promise((resolve, reject) => {
+    canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("the browser made no picture"))), "image/png");
+  });
 }
 
 /** Points of a circle {centre, radius, normal}. */
